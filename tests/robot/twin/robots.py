@@ -1,7 +1,6 @@
 """Plans of small robots, and helpers that run processes and wait for conditions."""
 
 import math
-import socket
 import subprocess
 import sys
 import time
@@ -9,11 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, SensorPlan
-from shapechanger.robot.guard import start
-from shapechanger.robot.guard.running import ServePlan, plan_fd
-from shapechanger.robot.twin.hardware import GrantedClock, SteadyClock, TwinHardware
-from shapechanger.robot.twin.rpc import BoardClient
-from shapechanger.robot.twin.start import BoardAt
 
 ACTIONS = (ActionPlan("steering"), ActionPlan("throttle", propels=True))
 
@@ -64,44 +58,8 @@ def process(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
             run.kill()
 
 
-@contextmanager
-def guard_process(
-    plan: GuardPlan, board: BoardAt
-) -> Iterator[tuple[subprocess.Popen[bytes], socket.socket]]:
-    """Start a guard on a board, with the daemon's end of their connection; kill it on exit."""
-    daemon, its_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    heartbeat, its_heartbeat = socket.socketpair()
-    daemon.setblocking(False)
-    fd = plan_fd(ServePlan(guard=plan, daemon={}, hardware=board.hardware))
-    fds = (fd, its_end.fileno(), its_heartbeat.fileno())
-    command = [sys.executable, "-I", str(start.__file__), "guard", "--plan-fd", str(fd)]
-    command += ["--daemon-fd", str(fds[1]), "--heartbeat-fd", str(fds[2])]
-    run = subprocess.Popen(command, pass_fds=fds)
-    with daemon, heartbeat, its_end, its_heartbeat, run as guard:
-        try:
-            yield guard, daemon
-        finally:
-            guard.kill()
-
-
 def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "it did not happen in time"
         time.sleep(0.005)
-
-
-def steady(hardware: TwinHardware) -> SteadyClock:
-    assert isinstance(hardware.clock, SteadyClock)
-    return hardware.clock
-
-
-def granted(hardware: TwinHardware) -> GrantedClock:
-    assert isinstance(hardware.clock, GrantedClock)
-    return hardware.clock
-
-
-def die(hardware: TwinHardware) -> None:
-    """Close the connection to the board abruptly, as the death of the process does."""
-    assert isinstance(hardware.board, BoardClient)
-    hardware.board._socket.close()

@@ -11,31 +11,24 @@ from shapechanger.robot.twin.board import START_NS
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.start import start_board
-from tests.robot.twin.robots import CAR, granted, process, steady
+from tests.robot.twin.robots import CAR, process
 
 pytestmark = pytest.mark.realtime
 
-_GUARD = """
+_WAITER = """
 import sys
-from gpiozero import Motor
 from shapechanger.robot.twin.hardware import connect
-hardware = connect(sys.argv[1])
-clock = hardware.clock
-motor = Motor(22, 27, pin_factory=hardware.pin_factory())
-until = int(sys.argv[2]) if len(sys.argv) > 2 else 2**62
-clock.wait([], until, 0.0)  # Join the clock.
+clock = connect(sys.argv[1]).clock
+clock.wait([], 2**62, 0.0)  # Join the clock.
 print("waits", flush=True)
-steps = 0
 while True:
-    if clock.wait([], until, 0.2):
-        steps += 1
-        motor.value = (steps * 7 % 19 + 1) / 20
+    clock.wait([], 2**62, 0.2)
 """
 
 
 def test_time_does_not_wait_for_a_dead_participant(tmp_path: Path) -> None:
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
-        with process(_GUARD, board.socket_path):
+        with process(_WAITER, board.socket_path):
             operator.advance(0.1)
         before = operator.advance(0.0)
         assert operator.advance(1.0) == before + 1_000_000_000
@@ -45,7 +38,7 @@ def test_a_wait_without_a_grant_returns(tmp_path: Path) -> None:
     """`wait` returns without a grant, so that a guard can send heartbeats while time is stopped."""
     with start_board(CAR, "twin", tmp_path) as board:
         hardware = connect(board.socket_path)
-        clock = granted(hardware)
+        clock = hardware.clock
         assert not clock.wait([], 2**62, 0.01)
         assert not clock.wait([], 2**62, 0.01)
         assert clock.now_ns() == START_NS
@@ -56,7 +49,7 @@ def test_sleep_advances_the_clock(tmp_path: Path) -> None:
     """Sleeps end on time and overlap, and return the capture time of the newest frame."""
     with start_board(CAR, "twin", tmp_path, CameraPlan("pipe", fps=20.0)) as board:
         hardware = connect(board.socket_path)
-        clock = granted(hardware)
+        clock = hardware.clock
 
         async def sleep() -> None:
             assert await clock.sleep(0.03) is None  # The pipe has no reader.
@@ -81,7 +74,7 @@ def test_in_real_time_the_clock_runs_by_itself(tmp_path: Path) -> None:
         with pytest.raises(RobotError, match="real time"):
             operator.advance(1.0)
         hardware = connect(board.socket_path)
-        clock = steady(hardware)
+        clock = hardware.clock
         end = clock.now_ns() + 20_000_000
         assert clock.wait([], end, 1.0)
         assert clock.now_ns() >= end
@@ -93,7 +86,7 @@ def test_in_real_time_the_clock_runs_by_itself(tmp_path: Path) -> None:
 def test_using_a_closed_board_raises(tmp_path: Path) -> None:
     board = start_board(CAR, "twin", tmp_path)
     hardware = connect(board.socket_path)
-    clock = granted(hardware)
+    clock = hardware.clock
     board.close()
     assert board.process.returncode == 0
     with pytest.raises(RobotError, match="board has ended"):

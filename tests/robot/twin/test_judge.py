@@ -21,26 +21,19 @@ def _pin(ms: float, pin: int, duty: float) -> Transition:
 
 
 def test_driving_without_permission_is_found() -> None:
+    """A level that never changes lasts to infinity; steering is allowed without a command."""
     for pin, sign in ((22, 1), (27, -1)):
         ledger = [_pin(10, pin, 0.5), _pin(11, pin, 0.0)]
         assert unauthorised(ledger, _NO_ONE_SHOT, [(9 * _MS, 250 * _MS)]) == []
         found = unauthorised(ledger, _NO_ONE_SHOT, [])
         assert found == [("drive", 10 * _MS, 11 * _MS, sign * 0.5)]
+    found = unauthorised([_pin(10, 22, 0.5)], _NO_ONE_SHOT, [(10 * _MS, 260 * _MS)])
+    assert found[0][1:3] == (260 * _MS, math.inf)
+    assert time_to_rest([_pin(10, 22, 0.5)], _NO_ONE_SHOT, 10 * _MS) == math.inf
     # Also below the duty at which the motor starts to move.
     plan = replace(CAR, outputs=(replace(DRIVE, settings={**DRIVE.settings, "start": 0.3}), STEER))
     assert unauthorised([_pin(10, 22, 0.01)], TwinWiring(plan, None), [])
-
-
-def test_steering_is_allowed_without_a_command() -> None:
     assert unauthorised([_pin(10, 17, 1.0)], _NO_ONE_SHOT, []) == []
-
-
-def test_a_motor_that_never_stops_is_found() -> None:
-    """A level that never changes lasts to infinity."""
-    ledger = [_pin(10, 22, 0.5)]
-    assert time_to_rest(ledger, _NO_ONE_SHOT, 10 * _MS) == math.inf
-    permitted = [(10 * _MS, 260 * _MS)]
-    assert unauthorised(ledger, _NO_ONE_SHOT, permitted)[0][1:3] == (260 * _MS, math.inf)
 
 
 def test_time_to_rest_ends_at_the_last_stop() -> None:
@@ -55,12 +48,9 @@ def test_the_one_shot_stops_a_frozen_pin() -> None:
     gone = [Transition(t=205 * _MS, kind="gone", pid=1), _pin(205, 22, 1.0), _pin(205, 25, 0.0)]
     ledger = sorted([*toggles, _pin(15, 22, 0.5), *gone], key=lambda line: line.t)
     assert time_to_rest(ledger, TwinWiring(CAR, 100.0), 205 * _MS) == pytest.approx(0.09, abs=0.006)
-    assert time_to_rest(ledger, _NO_ONE_SHOT, 205 * _MS) == math.inf
-    plain = replace(CAR, enable_pin=None)
-    assert time_to_rest(ledger, TwinWiring(plan=plain), 205 * _MS) == math.inf
-
-
-def test_without_toggling_the_motors_have_no_power() -> None:
+    for wiring in (_NO_ONE_SHOT, TwinWiring(plan=replace(CAR, enable_pin=None))):
+        assert time_to_rest(ledger, wiring, 205 * _MS) == math.inf
+    # Without toggling the motors have no power.
     assert propelled([_pin(10, 22, 0.5)], TwinWiring(CAR, 100.0)) == []
 
 

@@ -58,10 +58,15 @@ def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
 
 
 def test_an_invalid_operator_request_keeps_the_board_running(tmp_path: Path) -> None:
-    with (
-        start_board(CAR, "twin", tmp_path, CameraPlan("pipe", fps=20.0)) as board,
-        Operator(board.socket_path) as operator,
-    ):
+    camera = CameraPlan("pipe", fps=20.0)
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        with pytest.raises(RobotError, match="no camera"):
+            operator.break_camera("off")
+        with pytest.raises(RobotError, match="without a camera"):
+            board.camera_plan(camera)
+    seeing = tmp_path / "seeing"
+    seeing.mkdir()
+    with start_board(CAR, "twin", seeing, camera) as board, Operator(board.socket_path) as operator:
         with pytest.raises(RobotError, match="No fault of a camera matches 'of'"):
             operator.break_camera("of")  # pyright: ignore[reportArgumentType]  # Invalid on purpose.
         assert operator.advance(0.1) > 0

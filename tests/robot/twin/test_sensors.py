@@ -1,5 +1,6 @@
 """The robot's own sensor drivers on the twin's pins and chips."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -9,8 +10,12 @@ from typing import Any
 import pytest
 from gpiozero import Motor
 
-from shapechanger.contract.plan import SensorPlan
+from shapechanger.contract.plan import GuardPlan, SensorPlan
 from shapechanger.errors import RobotError
+from shapechanger.finger.anatomy import JOINTS
+from shapechanger.finger.parameters import NOMINAL
+from shapechanger.finger.twin import FingerWorld
+from shapechanger.robot.drivers.as5600 import open_and_read
 from shapechanger.robot.drivers.chip import SENSORS, SensorDriver
 from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.room import DrivingWorld
@@ -18,7 +23,6 @@ from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.in_process import LocalBoard
 from tests.robot.twin.robots import BUMPER, CAR, ENCODER
 
-_SINGLE = replace(ENCODER, settings={**ENCODER.settings, "b": -1})
 _DISTANCE = SensorPlan("sonar", "hcsr04", "distance", {"trigger": 20, "echo": 21, "max_m": 3.0})
 
 
@@ -51,14 +55,29 @@ def _rig(sensor: SensorPlan) -> Iterator[_Rig]:
     rig.board.hardware.close()
 
 
-@pytest.mark.parametrize("sensor", [ENCODER, _SINGLE])
 @pytest.mark.parametrize("throttle", [0.5, -0.5])
-def test_the_encoder_measures_the_speed(sensor: SensorPlan, throttle: float) -> None:
-    with _rig(sensor) as rig:
+def test_the_encoder_measures_the_speed(throttle: float) -> None:
+    with _rig(ENCODER) as rig:
         rig.motor.value = throttle
         seen = rig.advance(0.6)
         assert seen["speed"] == pytest.approx(rig.operator.where().speed, rel=0.1)
         assert seen["speed"] * throttle > 0.0
+
+
+def test_joint_encoders_measure_the_angles() -> None:
+    keys = [(7, 4090, 1), (0, 5, -1), (3, 2048, -1), (4, 1000, 1)]
+    rows = {
+        name: {"channel": channel, "zero": zero, "direction": direction}
+        for name, (channel, zero, direction) in zip(JOINTS, keys, strict=True)
+    }
+    plan = SensorPlan("joints", "as5600", "joints", {"bus": 1, "mux": 0x70, "rows": rows})
+    world = FingerWorld(NOMINAL, seed=2)
+    board = LocalBoard(TwinWiring(GuardPlan("it", (), (), (plan,))), world)
+    driver = open_and_read(plan, board.hardware)
+    for seed in range(5):
+        world.place(seed)
+        truth = {name: v for name, v in world.truth().items() if name.endswith("/angle")}
+        assert driver.read(0, 0.0) == pytest.approx(truth, abs=0.51 * 2.0 * math.pi / 4096)
 
 
 def test_the_bumper_is_pressed() -> None:

@@ -2,42 +2,34 @@
 
 import contextlib
 import re
-import socket
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.finger.parameters import NOMINAL
-from shapechanger.finger.twin import FingerWorld, finger_place
+from shapechanger.finger.twin import FingerWorld
 from shapechanger.layout import Layout
-from shapechanger.robot.guard.channel import GuardState, Order, decode_state, encode
+from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.guard.outputs import Switches, make_safe
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.profile.texts import finger_text, read
 from tests.robot.twin.in_process import InProcessRobot, LocalBoard
-from tests.robot.twin.robots import guard_process, until
 
 _REST = (0.0,) * 7
 _FLEX = (0.65, 0.65, 0.2, 0.2, 0.2, 0.2, 0.2)
 _BENT = (0.65, 0.65, 0.0, 0.0, 0.0, 0.0, 0.0)
-_ALL = (1.0,) * 7
 _TICK_NS = 10_000_000
 
 
 class _Bench:
-    """An armed rig, whose twin may be wired with other servos."""
+    """An armed rig."""
 
-    def __init__(self, profile: Profile, wired_as: Profile | None = None) -> None:
-        plan = None if wired_as is None else wired_as.guard_plan()
-        self.world = FingerWorld(NOMINAL, seed=3)
-        self.robot = InProcessRobot(profile, self.world, wired_as=plan)
+    def __init__(self, profile: Profile) -> None:
+        self.robot = InProcessRobot(profile, FingerWorld(NOMINAL, seed=3))
         self.names = Layout.from_json(self.robot.welcome.state_layout).names
         self.seen = self.robot.start()
         self.rig = self.robot.pins.require_rig()
@@ -142,24 +134,20 @@ def test_a_failed_servo_stops_all(bench: _Bench, family: str, how: str, text: st
     """All servos let go, also one that hears nothing, and stay so until a person has armed."""
     bench.drive(_FLEX, 25)
     bench.rig.break_servo("FDS", how)
-    for _ in range(40):
-        if bench.drive(_FLEX, 1).stop_reason:
-            break
+    bench.drive(_FLEX, 80)
     assert re.search(text, bench.seen.stop_reason), bench.seen.stop_reason
-    bench.drive(_FLEX, 40)
     assert bench.pulls() == [0.0] * 7
-    assert bench.seen.stop_reason != ""
-    if how == "overload":
-        with pytest.raises(RobotError, match=r"FDS .*overloaded. Only a reboot"):
-            bench.robot.arm()
-        return
-    bench.rig.break_servo("FDS", "")
-    bench.drive(_FLEX, 20)
+    refused = {"overload": r"FDS .*overloaded. Only a reboot"}.get(how)
+    if refused is None:
+        bench.rig.break_servo("FDS", "")
+        bench.drive(_FLEX, 20)
+        assert bench.seen.stop_reason != ""
     if how == "power" and family == "Dynamixel":
-        with pytest.raises(RobotError, match="FDS lost the power, and so the zero"):
+        refused = "FDS lost the power, and so the zero"
+    if refused:
+        with pytest.raises(RobotError, match=refused):
             bench.robot.arm()
-        return
-    if how != "hot":
+    elif how != "hot":
         bench.robot.arm()
         bench.drive(_FLEX, 40)
         assert bench.seen.stop_reason == ""
@@ -221,39 +209,3 @@ def test_a_missing_magnet_releases_all_tendons(tensed: _Bench) -> None:
     tensed.robot.arm()
     tensed.drive(_BENT, 20)
     assert tensed.seen.stop_reason == ""
-
-
-@pytest.mark.realtime
-def test_a_killed_guard_leaves_limp_servos(family: str, tmp_path: Path) -> None:
-    """The guard is killed while it pulls; a second later only friction holds the tendons."""
-    plan = read(finger_text(family)).guard_plan()
-    with (
-        start_board(plan, "twin", tmp_path, place=finger_place(NOMINAL)) as board,
-        Operator(board.socket_path) as operator,
-        guard_process(plan, board) as (guard, daemon),
-    ):
-        until(lambda: operator.advance(0.01) > 0 and _states(daemon) != [])
-        now_ns = operator.advance(0.5)  # The servos start.
-        daemon.send(encode(Order("arm", session=1, issued_ns=now_ns, person=True)))
-        now_ns = operator.advance(0.05)
-        assert any(state.armed for state in _states(daemon))
-        for seq in range(1, 41):
-            order = Order("command", 1, seq, issued_ns=now_ns, ttl_ms=1000, values=_ALL)
-            daemon.send(encode(order))
-            now_ns = operator.advance(0.02)
-        pulled = operator.tensions()["FDP"]
-        guard.kill()
-        guard.wait()
-        operator.advance(1.0)
-        left = operator.tensions()
-    friction_n = 0.5 if family == "Dynamixel" else 5.2
-    assert pulled > 1.6 * friction_n
-    assert max(left.values()) < 1.1 * friction_n
-
-
-def _states(daemon: socket.socket) -> list[GuardState]:
-    states: list[GuardState] = []
-    with contextlib.suppress(BlockingIOError):
-        while data := daemon.recv(65536):
-            states.append(decode_state(data))
-    return states

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,8 +12,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.twin.room import RADIUS, ROOM_LENGTH, ROOM_WIDTH, DrivingWorld
 
 _SIZE = (160, 120)
-_SEEDS = st.integers(0, 10_000)
-_VALUES = st.floats(-1.0, 1.0)
 
 # Outputs that drive each vehicle ahead, and outputs that turn it left.
 _VEHICLES = {
@@ -24,7 +23,6 @@ _VEHICLES = {
         {"left propeller": 0.0, "right propeller": 0.8},
     ),
 }
-_EACH_VEHICLE = pytest.mark.parametrize("kind", _VEHICLES)
 
 
 def _clearance(pose: Pose) -> float:
@@ -36,18 +34,22 @@ def _run(world: DrivingWorld, outputs: dict[str, float], seconds: float) -> None
         world.advance(0.01, outputs)
 
 
-@_EACH_VEHICLE
+def _driven(kind: str, outputs: dict[str, float], seconds: float) -> DrivingWorld:
+    world = DrivingWorld(_VEHICLES[kind][0], _SIZE, seed=1)
+    _run(world, outputs, seconds)
+    return world
+
+
+@pytest.mark.parametrize("kind", _VEHICLES)
 def test_ahead_is_along_the_heading_and_left_is_counter_clockwise(kind: str) -> None:
     """Outputs ahead do not turn; mirrored outputs turn right by the same angle; negated go back."""
     ahead, left = _VEHICLES[kind]
-    world = DrivingWorld(ahead, _SIZE, seed=1)
-    start = world.inputs().pose
-    _run(world, ahead, 0.8)
-    end, travelled_m = world.inputs().pose, world.inputs().travelled_m
-    assert travelled_m > 0.1
-    assert end.x - start.x == pytest.approx(travelled_m * math.cos(start.heading))
-    assert end.y - start.y == pytest.approx(travelled_m * math.sin(start.heading))
-    assert end.heading == pytest.approx(start.heading)
+    start = _driven(kind, {}, 0.0).inputs().pose
+    seen = _driven(kind, ahead, 0.8).inputs()
+    assert seen.travelled_m > 0.1
+    way = seen.travelled_m * np.array([math.cos(start.heading), math.sin(start.heading)])
+    assert (seen.pose.x, seen.pose.y) == pytest.approx((start.x + way[0], start.y + way[1]))
+    assert seen.pose.heading == pytest.approx(start.heading)
 
     other = {"left": "right", "right": "left"}
     signs = {"steering": -1.0, "rudder": -1.0}
@@ -57,17 +59,14 @@ def test_ahead_is_along_the_heading_and_left_is_counter_clockwise(kind: str) -> 
     }
     turns: list[float] = []
     for outputs in (left, right):
-        world = DrivingWorld(ahead, _SIZE, seed=1)
-        _run(world, outputs, 0.5)
-        turns.append(math.remainder(world.inputs().pose.heading - start.heading, math.tau))
-        assert world.inputs().yaw_rate * turns[-1] > 0.0
+        seen = _driven(kind, outputs, 0.5).inputs()
+        turns.append(math.remainder(seen.pose.heading - start.heading, math.tau))
+        assert seen.yaw_rate * turns[-1] > 0.0
     assert turns[0] > 0.05
     assert turns[1] == pytest.approx(-turns[0])
 
-    world = DrivingWorld(ahead, _SIZE, seed=1)
-    _run(world, {part: -value for part, value in ahead.items()}, 0.3)
-    assert world.inputs().speed < 0.0
-    assert world.inputs().travelled_m < 0.0
+    seen = _driven(kind, {part: -value for part, value in ahead.items()}, 0.3).inputs()
+    assert max(seen.speed, seen.travelled_m) < 0.0
 
 
 def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
@@ -94,13 +93,15 @@ def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
     assert world.inputs().travelled_m == travelled_m
 
 
-@given(seed=_SEEDS, steps=st.lists(st.tuples(_VALUES, _VALUES), min_size=1, max_size=30))
+@given(
+    seed=st.integers(0, 10_000),
+    steps=st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 2), min_size=1, max_size=30),
+)
 def test_no_vehicle_passes_through_walls(seed: int, steps: list[tuple[float, float]]) -> None:
     world = DrivingWorld({"left track", "right track"}, _SIZE, seed)
     for left, right in steps:
         world.advance(0.2, {"left track": left, "right track": right})
-        pose = world.inputs().pose
-        assert _clearance(pose) >= RADIUS - 1e-6
+        assert _clearance(world.inputs().pose) >= RADIUS - 1e-6
 
 
 def test_mixed_parts_are_refused() -> None:
