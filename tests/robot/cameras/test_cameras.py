@@ -21,14 +21,9 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras import v4l2 as api
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
 from shapechanger.robot.cameras.v4l2 import V4l2
-from tests.robot.cameras.barcode import read_barcode
+from tests.robot.cameras.frames import jpeg_of, read_barcode, with_comment
 
 pytestmark = pytest.mark.realtime
-
-
-def _jpeg(value: int = 0, size: tuple[int, int] = (32, 24)) -> bytes:
-    image = np.full((size[1], size[0], 3), value, np.uint8)
-    return simplejpeg.encode_jpeg(image, 80, colorsubsampling="420")
 
 
 def _plan(driver: str, **settings: int | str) -> CameraPlan:
@@ -72,7 +67,7 @@ def test_the_pattern_changes_and_carries_its_time() -> None:
 def test_a_folder_is_read_in_order_and_repeated(tmp_path: Path) -> None:
     """Images are sorted by name, and other files ignored."""
     for name, value in (("b.jpg", 90), ("a.jpg", 10), ("c.JPEG", 200)):
-        (tmp_path / name).write_bytes(_jpeg(value))
+        (tmp_path / name).write_bytes(jpeg_of(value))
     (tmp_path / "notes.txt").write_text("no picture")
     camera = open_camera(_plan("file", path=str(tmp_path)))
     means = [round(simplejpeg.decode_jpeg(camera.read().jpeg).mean()) for _ in range(4)]
@@ -82,11 +77,11 @@ def test_a_folder_is_read_in_order_and_repeated(tmp_path: Path) -> None:
 
 def test_a_bad_file_is_named_and_skipped(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(b"broken")
-    (tmp_path / "b.jpg").write_bytes(_jpeg(90))
+    (tmp_path / "b.jpg").write_bytes(jpeg_of(90))
     camera = open_camera(_plan("file", path=str(tmp_path)))
     with pytest.raises(RobotError, match=r"a\.jpg: .*an incomplete JPEG"):
         camera.read()
-    assert camera.read().jpeg == _jpeg(90)
+    assert camera.read().jpeg == jpeg_of(90)
 
 
 @pytest.fixture
@@ -97,33 +92,27 @@ def fifo(tmp_path: Path) -> Path:
     return path
 
 
-def _comment(jpeg: bytes, comment: bytes) -> bytes:
-    return jpeg[:2] + b"\xff\xfe" + (len(comment) + 2).to_bytes(2, "big") + comment + jpeg[2:]
-
-
 def test_a_pipe_returns_the_newest_frame_and_its_time(fifo: Path) -> None:
     """Older frames in the pipe are skipped, and so are bytes between frames, which are counted."""
     camera = open_camera(_plan("pipe", path=str(fifo)))
+    old, new = (with_comment(jpeg_of(n), b"captured_ns=%d" % n) for n in (10, 90))
     with fifo.open("wb", buffering=0) as writer:
-        writer.write(
-            _comment(_jpeg(10), b"captured_ns=77") + _comment(_jpeg(90), b"captured_ns=78")
-        )
-        frame = camera.read()
-        assert frame == Frame(_comment(_jpeg(90), b"captured_ns=78"), 78)
+        writer.write(old + new)
+        assert camera.read() == Frame(new, 90)
         before_ns = time.monotonic_ns()
-        writer.write(_jpeg(30))
+        writer.write(b"garbage" + jpeg_of(40))
         frame = camera.read()
+        assert (frame.jpeg, frame.skipped) == (jpeg_of(40), 7)
         assert before_ns <= frame.captured_ns <= time.monotonic_ns()
-        writer.write(b"garbage" + _jpeg(40))
-        frame = camera.read()
-        assert (frame.jpeg, frame.skipped) == (_jpeg(40), 7)
     with pytest.raises(RobotError, match="has ended"):
         camera.read()
-    writing = threading.Thread(target=fifo.write_bytes, args=(_jpeg(50),))
+    writing = threading.Thread(target=fifo.write_bytes, args=(jpeg_of(50),))
     writing.start()
-    assert camera.read().jpeg == _jpeg(50)  # The next writer.
+    assert camera.read().jpeg == jpeg_of(50)  # The next writer.
     writing.join()
-    camera.close()
+    with pytest.raises(RobotError, match="has ended"):
+        camera.read()
+    assert _ends_when_closed(camera, camera.read) == "The camera is closed."
 
 
 def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
@@ -134,26 +123,12 @@ def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
     with fifo.open("wb", buffering=0) as writer:
         fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, 1 << 18)
         count = 150_000 // len(old)  # More than one read returns.
-        writer.write(old * count + _jpeg(90) + _jpeg(20)[:100])
-        assert camera.read().jpeg == _jpeg(90)
-        writer.write(_jpeg(20)[100:])
-        assert camera.read().jpeg == _jpeg(20)
-        writer.write(_jpeg(30))
-    assert camera.read().jpeg == _jpeg(30)  # The writer closed, but this frame is new.
-    with pytest.raises(RobotError, match="has ended"):
-        camera.read()
-
-
-def test_closing_ends_a_read_that_waits_for_a_writer(fifo: Path) -> None:
-    camera = open_camera(_plan("pipe", path=str(fifo)))
-    assert _ends_when_closed(camera, camera.read) == "The camera is closed."
-
-
-def test_a_file_of_frames_is_read_in_order(tmp_path: Path) -> None:
-    file = tmp_path / "drive.mjpeg"
-    file.write_bytes(b"".join(map(_jpeg, (10, 20, 30))))
-    camera = open_camera(_plan("pipe", path=str(file)))
-    assert [camera.read().jpeg for _ in range(3)] == [_jpeg(v) for v in (10, 20, 30)]
+        writer.write(old * count + jpeg_of(90) + jpeg_of(20)[:100])
+        assert camera.read().jpeg == jpeg_of(90)
+        writer.write(jpeg_of(20)[100:])
+        assert camera.read().jpeg == jpeg_of(20)
+        writer.write(jpeg_of(30))
+    assert camera.read().jpeg == jpeg_of(30)  # The writer closed, but this frame is new.
     with pytest.raises(RobotError, match="has ended"):
         camera.read()
 
@@ -213,12 +188,12 @@ def test_a_webcam_returns_the_newest_frame_and_the_kernels_time(tmp_path: Path) 
     assert kernel.calls[-1] == api.STREAM_ON
     monotonic = api.BUFFER_FLAG_MONOTONIC
     kernel.pictures = [
-        (_jpeg(10), 1_000_000, monotonic),
-        (_jpeg(90) + bytes(20), 2_000_000, monotonic),
+        (jpeg_of(10), 1_000_000, monotonic),
+        (jpeg_of(90) + bytes(20), 2_000_000, monotonic),
         (b"torn", 3_000_000, monotonic | api.BUFFER_FLAG_ERROR),
     ]
-    assert camera.read() == Frame(_jpeg(90), 2_000_000)
-    kernel.pictures = [(_jpeg(20), 5, 0)]  # A driver without a monotonic clock.
+    assert camera.read() == Frame(jpeg_of(90), 2_000_000)
+    kernel.pictures = [(jpeg_of(20), 5, 0)]  # A driver without a monotonic clock.
     assert camera.read().captured_ns > 1_000_000_000
     camera.close()
     with pytest.raises(RobotError, match="closed"):
@@ -257,22 +232,16 @@ def test_pi_camera_gives_jpeg_with_the_sensors_time(pi: Mock) -> None:
     pi.capture_request.assert_called_once_with(wait=2.0)
     request.make_array.assert_called_once_with("main")
     request.release.assert_called_once_with()
+    request.make_array.return_value = np.zeros((48, 64, 3), np.uint8)
+    with pytest.raises(RobotError, match="64 by 48"):
+        camera.read()
+    assert request.release.call_count == 2
+    pi.capture_request.side_effect = TimeoutError
+    with pytest.raises(RobotError, match="sent no frame for 2 s"):
+        camera.read()
     camera.close()
     camera.close()
     pi.stop.assert_called_once_with()
     pi.close.assert_called_once_with()
     with pytest.raises(RobotError, match="closed"):
-        camera.read()
-
-
-def test_a_pi_camera_that_hangs_or_changes_its_size_raises(pi: Mock) -> None:
-    """Requests are released also after an error."""
-    camera = open_camera(_plan("picamera2", number=0))
-    request = pi.capture_request.return_value
-    request.make_array.return_value = np.zeros((48, 64, 3), np.uint8)
-    with pytest.raises(RobotError, match="64 by 48"):
-        camera.read()
-    request.release.assert_called_once_with()
-    pi.capture_request.side_effect = TimeoutError
-    with pytest.raises(RobotError, match="sent no frame for 2 s"):
         camera.read()

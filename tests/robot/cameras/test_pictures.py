@@ -15,23 +15,13 @@ from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.cameras.jpeg import JpegSplitter, captured_ns_of, checked_frame
 from shapechanger.robot.cameras.sources import barcode_rows, draw_barcode
 from shapechanger.robot.daemon.camera import FrameChecks
-from tests.robot.cameras.barcode import read_barcode
+from tests.robot.cameras.frames import jpeg_of, read_barcode, with_comment
 
 _RNG = np.random.default_rng(20171121)
 
 
 def _picture(width: int = 160, height: int = 120) -> np.ndarray:
     return _RNG.integers(0, 256, (height, width, 3), dtype=np.uint8)
-
-
-def _jpeg(value: int = 0, width: int = 32, height: int = 24) -> bytes:
-    image = np.full((height, width, 3), value, np.uint8)
-    return simplejpeg.encode_jpeg(image, 80, colorsubsampling="420")
-
-
-def _with_comment(jpeg: bytes, comment: bytes) -> bytes:
-    segment = b"\xff\xfe" + (len(comment) + 2).to_bytes(2, "big") + comment
-    return jpeg[:2] + segment + jpeg[2:]
 
 
 @given(
@@ -54,10 +44,10 @@ def test_barcode_survives_jpeg(
 
 def test_a_frame_of_the_wrong_size_is_refused() -> None:
     with pytest.raises(RobotError, match="32 by 24 pixels; the profile sets 160 by 120"):
-        checked_frame(_jpeg(), 0, CameraPlan("file"))
+        checked_frame(jpeg_of(), 0, CameraPlan("file"))
 
 
-@pytest.mark.parametrize("data", [b"", b"no picture", _jpeg()[:-2], b"\xff\xd8 and \xff\xd9"])
+@pytest.mark.parametrize("data", [b"", b"no picture", jpeg_of()[:-2], b"\xff\xd8 and \xff\xd9"])
 def test_invalid_jpeg_is_refused(data: bytes) -> None:
     with pytest.raises(RobotError, match=r"(incomplete|invalid) JPEG"):
         checked_frame(data, 0, CameraPlan("file", size=(32, 24)))
@@ -72,21 +62,16 @@ def test_a_truncated_frame_is_not_rotated() -> None:
     assert FrameChecks().refusal(Frame(broken, 0)) != ""
 
 
-def _turned(jpeg: bytes, quality: int) -> bytes:
-    height, width, _, _ = simplejpeg.decode_jpeg_header(jpeg)
-    plan = CameraPlan("file", (int(width), int(height)), jpeg_quality=quality, flip=True)
-    return checked_frame(jpeg, 0, plan).jpeg
-
-
 def test_rotating_twice_restores_the_image() -> None:
     image = np.zeros((24, 32, 3), np.uint8)
     image[:8, :8] = 255
-    jpeg = simplejpeg.encode_jpeg(image, 95)
-    once = simplejpeg.decode_jpeg(_turned(jpeg, 95))
-    assert once[-4, -4].min() > 200
-    assert once[4, 4].max() < 50
-    twice = simplejpeg.decode_jpeg(_turned(_turned(jpeg, 95), 95))
-    np.testing.assert_allclose(twice, image, atol=30)
+    plan = CameraPlan("file", (32, 24), jpeg_quality=95, flip=True)
+    once = checked_frame(simplejpeg.encode_jpeg(image, 95), 0, plan).jpeg
+    np.testing.assert_allclose(
+        simplejpeg.decode_jpeg(once)[[-4, 4], [-4, 4]].mean(1), (255, 0), atol=50
+    )
+    twice = checked_frame(once, 0, plan).jpeg
+    np.testing.assert_allclose(simplejpeg.decode_jpeg(twice), image, atol=30)
 
 
 def _split(stream: bytes, cuts: Iterable[int] = ()) -> tuple[list[bytes], int]:
@@ -106,7 +91,11 @@ def _with_thumbnail(jpeg: bytes, thumbnail: bytes) -> bytes:
     return jpeg[:2] + b"\xff\xe1" + size + b"Exif\0\0" + thumbnail + jpeg[2:]
 
 
-_FRAMES = [_jpeg(3), _with_thumbnail(_jpeg(90), _jpeg(5)), _with_comment(_jpeg(7), b"\xff\xd9")]
+_FRAMES = [
+    jpeg_of(3),
+    _with_thumbnail(jpeg_of(90), jpeg_of(5)),
+    with_comment(jpeg_of(7), b"\xff\xd9"),
+]
 _BETWEEN = st.binary(max_size=40).filter(lambda data: b"\xff\xd8" not in data)
 
 
@@ -126,36 +115,38 @@ def test_a_stream_yields_its_frames_and_no_others(between: list[bytes], cuts: se
 def test_a_frame_that_is_cut_off_is_skipped(frame: bytes, data: st.DataObject) -> None:
     """The frames after it are found, once more bytes arrive than a segment may claim."""
     cut = data.draw(st.integers(0, len(frame) - 1))
-    after = [_jpeg(value) for value in (1, 2)] * 60
+    after = [jpeg_of(value) for value in (1, 2)] * 60
     found, _ = _split(frame[:cut] + b"".join(after))
     # A thumbnail whose frame is cut off looks like a frame, and a segment that is cut off may end
     # exactly at the end of the next frame.
-    assert [jpeg for jpeg in found if jpeg != _jpeg(5)] in (after, after[1:])
+    assert [jpeg for jpeg in found if jpeg != jpeg_of(5)] in (after, after[1:])
 
 
 @given(garbage=st.binary(max_size=200))
 def test_a_stream_recovers_after_garbage(garbage: bytes) -> None:
     """After bytes that look like the start of a frame, frames are found once enough follow."""
-    found, _ = _split(_jpeg(9)[:20] + garbage + _jpeg(1) * 150)
-    assert found.count(_jpeg(1)) >= 30
+    found, _ = _split(jpeg_of(9)[:20] + garbage + jpeg_of(1) * 150)
+    assert found.count(jpeg_of(1)) >= 30
 
 
 def test_a_stream_without_frames_is_refused() -> None:
-    for nothing in (_jpeg()[:-2] + bytes(4 << 20), bytes(2 << 20), b"\xff\xd8\xff\xd9" * 270_000):
+    for nothing in (jpeg_of()[:-2] + bytes(4 << 20), bytes(2 << 20), b"\xff\xd8\xff\xd9" * 270_000):
         splitter = JpegSplitter()
         splitter.feed(nothing)
         with pytest.raises(RobotError, match="without a complete JPEG"):
             splitter.next()
-        splitter.feed(_jpeg(7))
-        assert splitter.next() == _jpeg(7)
+        splitter.feed(jpeg_of(7))
+        assert splitter.next() == jpeg_of(7)
 
 
-def test_the_capture_time_is_read_from_the_comment() -> None:
-    """Missing and malformed comments give None."""
-    assert captured_ns_of(_with_comment(_jpeg(), b"captured_ns=1234567890123")) == 1234567890123
-    assert captured_ns_of(_with_comment(_jpeg(), b"captured_ns=soon")) is None
-    assert captured_ns_of(_with_comment(_jpeg(), b"x" * 100)) is None
-    assert captured_ns_of(_jpeg()) is None
-    stream = JpegSplitter()
-    stream.feed(_with_comment(_jpeg(), b"\xff\xd9"))  # The end of an image inside a comment.
-    assert stream.next() == _with_comment(_jpeg(), b"\xff\xd9")
+@pytest.mark.parametrize(
+    ("comment", "time_ns"),
+    [
+        (b"captured_ns=1234567890123", 1234567890123),
+        (b"captured_ns=soon", None),
+        (b"x" * 100, None),
+        (b"", None),
+    ],
+)
+def test_the_capture_time_is_read_from_the_comment(comment: bytes, time_ns: int | None) -> None:
+    assert captured_ns_of(with_comment(jpeg_of(), comment) if comment else jpeg_of()) == time_ns

@@ -17,8 +17,6 @@ import pytest
 from shapechanger.contract import testing
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.contract.testing import MakeEnv
-from shapechanger.demos.episodes import episodes_of, read_episode
-from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.errors import LinkError, RenderError, RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.layout import Element, Feature
 from shapechanger.robot.client.env import RemoteVehicleEnv
@@ -33,12 +31,13 @@ Run = Callable[..., Robot]
 
 ID = "shapechanger/RemoteVehicle-v1"
 AHEAD = np.array([0.0, 1.0], np.float32)
-REST = np.zeros(2, np.float32)
 TENDONS = tuple(
     Feature(name, "1", 0.0, 1.0, Element("tendon", name)) for name in ("FDP", "FDS", "EDC")
 )
 
 Made = Callable[..., Any]
+
+REST = np.zeros(2, np.float32)
 
 
 @pytest.fixture
@@ -93,7 +92,8 @@ def test_an_env_passes_the_checks(
 
 
 def test_layouts_name_images_and_states(run: Run, made: Made) -> None:
-    env = made(run(), state=True, size=(40, 30))
+    """Images have the requested size, frames the camera's."""
+    env = made(run(), state=True, size=(40, 30), render_mode="rgb_array")
     observation, action = layouts_of(env)
     assert observation.names == ("camera/image", *(f.name for f in STATE))
     assert observation["camera/image"].shape == (30, 40, 3)
@@ -101,13 +101,6 @@ def test_layouts_name_images_and_states(run: Run, made: Made) -> None:
     seen, _ = env.reset(seed=0)
     assert env.observation_space.contains(seen)
     assert gym.spaces.flatten(env.observation_space, seen).shape == (observation.size,)
-
-
-@pytest.mark.parametrize("size", [(160, 120), (80, 60), (128, 128)])
-def test_images_have_the_requested_size(run: Run, size: tuple[int, int], made: Made) -> None:
-    env = made(run(), size=size, render_mode="rgb_array")
-    seen, _ = env.reset(seed=0)
-    assert seen.shape == (size[1], size[0], 3)
     assert env.render().shape == (120, 160, 3)
 
 
@@ -302,20 +295,29 @@ def test_reset_waits_for_another_driver(run: Run, made: Made, started: Made) -> 
         impatient.reset(seed=0)
 
 
-def test_the_reset_routine_of_the_profile_runs(run: Run, started: Made) -> None:
+def test_the_reset_routine_of_the_profile_runs(run: Run, made: Made, started: Made) -> None:
     robot = run(reset=(((0.0, -0.5), 0.5), ((1.0, 0.0), 0.2)))
     started(robot, on_reset="routine")
     values = [command.values for command in robot.received(m.Command)]
     assert values.count((0.0, -0.5)) == 10
     assert values.count((1.0, 0.0)) == 4
-
-
-def test_a_missing_reset_routine_is_an_error(run: Run, made: Made) -> None:
-    robot = run()
-    env = made(robot, on_reset="routine")
+    without = run()
     with pytest.raises(RobotRefused, match=r"\[\[reset\]\]"):
-        env.reset(seed=0)
-    assert not robot.received(m.Arm)
+        made(without, on_reset="routine").reset(seed=0)
+    assert not without.received(m.Arm)
+
+
+@pytest.mark.parametrize("how", ["closed", "dropped"])
+def test_an_ended_env_gives_control_back(run: Run, how: str) -> None:
+    robot = run()
+    env = gym.make(ID, pace="lockstep", **robot.arguments)
+    env.reset(seed=0)
+    if how == "closed":
+        env.close()
+        env.close()
+    del env
+    gc.collect()
+    eventually(lambda: len(robot.received(m.Release)) == 1)
 
 
 @pytest.mark.parametrize(("pace", "missed"), [("realtime", [1, 1, 2, 2]), ("lockstep", [0] * 4)])
@@ -364,78 +366,18 @@ def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
         gym.make(ID, robot="tim")
 
 
-@pytest.mark.parametrize(
-    ("how", "error"),
-    [
-        ({"on_reset": "opertor"}, UnknownName),
-        ({"reward": {"speed": 1.0}}, UnknownName),
-        ({"size": (0, 10)}, SpaceMismatch),
-    ],
-)
-def test_invalid_arguments_are_errors(
-    run: Run, how: dict[str, Any], error: type[Exception]
-) -> None:
-    with pytest.raises(error):
-        RemoteVehicleEnv(**run().arguments, **how)
-
-
-@pytest.mark.parametrize("how", ["closed", "dropped"])
-def test_an_ended_env_gives_control_back(run: Run, how: str) -> None:
-    robot = run()
-    env = gym.make(ID, pace="lockstep", **robot.arguments)
-    env.reset(seed=0)
-    if how == "closed":
-        env.close()
-        env.close()
-    del env
-    gc.collect()
-    eventually(lambda: len(robot.received(m.Release)) == 1)
-    gym.make(ID, pace="lockstep", **robot.arguments).close()
-
-
 def test_four_keys_drive_as_in_2017(run: Run, made: Made) -> None:
     env = DiscreteDriving(made(run()), throttle=0.6, steering=0.4)
     env.reset(seed=0)
-    applied = {
-        way: env.step(np.int64(i))[4]["action_applied"].tolist() for i, way in enumerate(FOUR_WAYS)
-    }
-    assert applied == {
-        "forward": pytest.approx([0.0, 0.6]),
-        "backward": pytest.approx([0.0, -0.6]),
-        "right": pytest.approx([0.4, 0.0]),
-        "left": pytest.approx([-0.4, 0.0]),
-    }
-
-
-def test_four_keys_need_steering_throttle_and_one_of_four(run: Run, made: Made) -> None:
-    with pytest.raises(SpaceMismatch, match="steering, throttle"):
-        DiscreteDriving(made(run(actions=(THROTTLE,))))
-    env = DiscreteDriving(made(run()))
-    for key in (4, -1, 1.5, "forward", [0.0, 1.0], None):
+    applied = dict(forward=[0.0, 0.6], backward=[0.0, -0.6], right=[0.4, 0.0], left=[-0.4, 0.0])
+    for key, way in enumerate(FOUR_WAYS):
+        info = env.step(np.int64(key))[4]
+        assert info["action_applied"].tolist() == pytest.approx(applied[way])
+    for key in (4, -1, 1.5, "forward", None):
         with pytest.raises(SpaceMismatch, match=r"0 \(forward\), 1 \(backward\)"):
             env.action(key)
-
-
-def test_frames_are_recorded_as_they_were_received(run: Run, tmp_path: Path) -> None:
-    robot = run(arm_by_itself=True)
-    options: dict[str, Any] = {"pace": "lockstep", "state": True} | robot.arguments
-    with gym.make("shapechanger/RemoteVehicle-v1", **options) as made:
-        env = RecordEpisodes(made, tmp_path, driver="person")
-        env.reset()
-        sent = [env.unwrapped.newest_jpeg]
-        for _ in range(5):
-            env.step(np.array([0.0, 0.5], np.float32))
-            sent.append(env.unwrapped.newest_jpeg)
-        env.end()
-    (path,) = episodes_of(tmp_path)
-    episode = read_episode(path)
-    assert [episode.jpeg(step) for step in episode.steps] == sent[:5]
-    assert episode.header.clock == robot.clock
-    assert [s.captured_ns for s in episode.steps] == sorted(
-        {s.captured_ns for s in episode.steps if s.captured_ns}
-    )
-    assert episode.steps[-1].applied == (0.0, 0.5)
-    assert len(episode.steps[0].state) == 4
+    with pytest.raises(SpaceMismatch, match="steering, throttle"):
+        DiscreteDriving(made(run(actions=(THROTTLE,))))
 
 
 PAGE = Path(__file__).parents[3] / "docs" / "remote.md"

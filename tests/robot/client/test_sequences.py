@@ -30,13 +30,12 @@ def test_an_arrow_is_one_key_however_it_is_split(sequence: bytes, key: str) -> N
 
 @pytest.mark.parametrize("sequence", UNKNOWN, ids=repr)
 def test_an_unknown_sequence_is_no_key_however_it_is_split(sequence: bytes) -> None:
-    assert set(keys_in_bytes(sequence)) == {OTHER}
-    for place in range(1, len(sequence)):
+    """Nor does any part of one move a robot or type anything."""
+    assert set(pieces([sequence], 0.0)) == {OTHER}
+    splits = [(sequence[:place], sequence[place:]) for place in range(1, len(sequence))]
+    for parts in (*splits, [bytes([byte]) for byte in sequence]):
         for gap_s in (0.9 * ESCAPE_WAIT_S, 0.9 * REST_WAIT_S):
-            assert orders(pieces((sequence[:place], sequence[place:]), gap_s)) == []
-    each = [bytes([byte]) for byte in sequence]
-    assert orders(pieces(each, 0.9 * ESCAPE_WAIT_S)) == []
-    assert orders(pieces(each, 0.9 * REST_WAIT_S)) == []
+            assert set(pieces(parts, gap_s)) <= {*STOPS, OTHER} - set(DIRECTIONS)
 
 
 @given(
@@ -99,16 +98,9 @@ def test_keys_work_again_after_a_part_of_a_sequence(sequence: bytes, size: int) 
     ids=repr,
 )
 def test_a_stop_has_many_encodings(sequence: bytes, key: str) -> None:
-    keys = keys_in_bytes(sequence)
+    keys = pieces([sequence], 0.0)
     assert key in keys
     assert set(keys) <= {key, OTHER}
-
-
-def test_a_held_escape_stops_at_once() -> None:
-    parser, now_s = KeyParser(), 0.0
-    while "escape" not in parser.feed(b"\x1b", now_s):
-        now_s += 0.033
-    assert now_s <= 2 * ESCAPE_WAIT_S
 
 
 @pytest.mark.parametrize(
@@ -136,10 +128,8 @@ def pieces(parts: list[bytes] | tuple[bytes, ...], gap_s: float) -> list[str]:
     return keys + parser.expire(len(parts) * gap_s + REST_WAIT_S)
 
 
-def keys_in_bytes(data: bytes) -> list[str]:
-    return pieces([data], 0.0)
-
-
-def orders(keys: list[str]) -> list[str]:
-    """Return the keys that could move a robot or that type anything."""
-    return [key for key in keys if key in DIRECTIONS or key not in {*STOPS, OTHER}]
+def test_a_held_escape_stops_at_once() -> None:
+    parser, now_s = KeyParser(), 0.0
+    while "escape" not in parser.feed(b"\x1b", now_s):
+        now_s += 0.033
+    assert now_s <= 2 * ESCAPE_WAIT_S

@@ -54,40 +54,28 @@ def test_layouts_are_in_newtons_metres_and_radians() -> None:
     assert _PROFILE.action_layout()["LUM"].gain == pytest.approx(5.4)
     state = _PROFILE.state_layout()
     assert state.names[:2] == ("FDP/length", "FDS/length")
-    assert [state[f"PI/{name}"].unit for name in ("length", "speed", "tension")] == [
-        "m",
-        "m/s",
-        "N",
-    ]
+    units = [state[f"PI/{name}"].unit for name in ("length", "speed", "tension")]
+    assert units == ["m", "m/s", "N"]
     assert state["PI/tension"].high == 15.0
     assert state.size == 32
     angle = state["MCP_abduction/angle"]
     assert (angle.unit, angle.low, angle.high) == ("rad", -math.pi, math.pi)
-    assert state.names[21:25] == tuple(
-        f"{name}/angle" for name in ("MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion")
-    )
+    joints = ("MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion")
+    assert state.names[21:25] == tuple(f"{name}/angle" for name in joints)
+    blind = read(_TEXT.replace(_JOINTS, "")).state_layout()
+    assert not [name for name in blind.names if name.endswith("/angle")]
 
 
-def test_a_finger_without_encoders_has_no_angles() -> None:
-    profile = read(_TEXT.replace(_JOINTS, ""))
-    assert [sensor.name for sensor in profile.sensors] == ["tendons"]
-    assert not [name for name in profile.state_layout().names if name.endswith("/angle")]
-
-
-def test_an_action_of_two_tendons_has_no_newtons() -> None:
-    text = _TEXT.replace(_part("[action.FDS]", "[action.EIP]"), "")
-    action = read(changed("mix = { FDS = 1.0 }", "mix = { FDP = 1.0 }", text)).action_layout()[
-        "FDP"
-    ]
-    assert (action.gain, action.gain_unit) == (1.0, "")
-
-
-def test_control_of_the_length_has_its_gain_in_metres() -> None:
-    """The action of such a tendon goes from the longest to the shortest length."""
+def test_the_gain_of_an_action_is_in_the_unit_that_its_servo_controls() -> None:
+    """A length goes from the longest to the shortest; an action of two tendons has no unit."""
     keys = 'id = 1\ncontrol = "length"\nlongest_m = 0.01\nshortest_m = -0.03\n'
-    layout = read(_TEXT.replace("id = 1\n", keys, 1)).action_layout()
-    assert (layout["FDP"].gain, layout["FDP"].gain_unit) == (pytest.approx(0.04), "m")
-    assert layout["FDS"].gain_unit == "N"
+    both = _TEXT.replace(_part("[action.FDS]", "[action.EIP]"), "")
+    for text, gain, unit in (
+        (_TEXT.replace("id = 1\n", keys, 1), 0.04, "m"),
+        (changed("mix = { FDS = 1.0 }", "mix = { FDP = 1.0 }", both), 1.0, ""),
+    ):
+        action = read(text).action_layout()["FDP"]
+        assert (action.gain, action.gain_unit) == (pytest.approx(gain), unit)
 
 
 def test_a_feetech_rig_has_the_settings_of_its_power_switch() -> None:
@@ -113,18 +101,14 @@ def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
 _TABLE = r"""
 channel = 3\n -> channel = 2\n -> has the channel 2, which PIP_flexion has, too
 channel = 3\n -> channel = 8\n -> from 0 to 7
-channel = 3\n -> chanel = 3\n -> (did you mean 'channel'?)
 channel = 3\n ->  -> lacks the key 'channel'
 [sensor.joints.DIP_flexion] -> [sensor.joints.3] -> the name '3' must
 mux = 0x70 -> mux = 0x68 -> from 112 to 119
-mux = 0x70 -> mox = 0x70 -> [sensor.joints] has no key 'mox'
 direction = 1 -> direction = 0 -> must be one of -1, 1, not 0
 then = "release" -> then = "hold" -> must be "release"
 \nid = 2\n -> \nid = 1\n -> id 1 of the servo bus is used twice: by id of [output.FDP]
 pretension_n = 1.0 -> pretension_n = 30.0 -> pretension_n of [output.FDP] must be
 watchdog_ms = 100 -> watchdog_ms = 90 -> in steps of 20 from 20 to 2540, not 90
-XL330-M077 -> XL330-M078 -> (did you mean 'XL330-M077'?)
-id = 1\n -> id = 1\ncontrol = "lenght"\n -> (did you mean 'length'?)
 id = 1\n -> id = 1\ncontrol = "length"\n -> must be below longest_m, not 0 and 0 m
 """
 _FEETECH = r"""

@@ -56,18 +56,16 @@ def test_bom_and_crlf_are_accepted(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ProfileError, match=r"There is no file .*gone\.toml; there are: boat"):
-        load_profile(tmp_path / "gone.toml")
-    with pytest.raises(ProfileError, match="cannot be read: Is a directory"):
-        load_profile(tmp_path)
-    path = tmp_path / "x.toml"
+    path, long = tmp_path / "x.toml", tmp_path / "long.toml"
     path.write_bytes(b"# One.\n\xff")
-    with pytest.raises(ProfileError, match=r"x\.toml, line 2: this is not UTF-8 text"):
-        load_profile(path)
-    path.write_bytes(b"#" * (1024 * 1024 + 1))
-    with pytest.raises(ProfileError, match="longer than a profile can be"):
-        load_profile(path)
-    with pytest.raises(ProfileError, match=r"x\.toml/y\.toml cannot be read: Not a directory"):
-        load_profile(path / "y.toml")
-    with pytest.raises(ProfileError, match="cannot be read: embedded null"):
-        load_profile("a\0b.toml")
+    long.write_bytes(b"#" * (1024 * 1024 + 1))
+    for unread, message in (
+        (tmp_path / "gone.toml", r"There is no file .*gone\.toml; there are: boat"),
+        (tmp_path, "cannot be read: Is a directory"),
+        (path, r"x\.toml, line 2: this is not UTF-8 text"),
+        (long, "longer than a profile can be"),
+        (path / "y.toml", r"x\.toml/y\.toml cannot be read: Not a directory"),
+        ("a\0b.toml", "cannot be read: embedded null"),
+    ):
+        with pytest.raises(ProfileError, match=message):
+            load_profile(unread)

@@ -39,22 +39,27 @@ def test_a_first_profile_differs_only_in_its_name(kind: str, tmp_path: Path) -> 
 def test_a_first_profile_overwrites_nothing(tmp_path: Path) -> None:
     path = tmp_path / "car.toml"
     path.write_text("mine")
-    with pytest.raises(OutputError, match=r"Cannot write .*: it exists"):
-        write_profile("car", path, "car")
-    assert path.read_text() == "mine"
-    with pytest.raises(
-        OutputError, match=r"Cannot write .*: (it exists|Not a directory|File exists)"
+    new = tmp_path / "new.toml"
+    for arguments, error, message in (
+        (("car", path, "car"), OutputError, "Cannot write .*: it exists"),
+        (
+            ("car", path / "x.toml", "car"),
+            OutputError,
+            "Cannot write .*: (it exists|Not a dir|File)",
+        ),
+        (
+            ("car", tmp_path / ("x" * 300), "car"),
+            OutputError,
+            "Cannot write .*: File name too long",
+        ),
+        (("kar", new, "car"), UnknownName, r"No kind of robot matches 'kar'. Did you mean .car.\?"),
+        (("car", new, "car", "us"), UnknownName, r"No camera matches 'us'. Did you mean 'usb'\?"),
+        (("car", new, ""), ProfileError, r"name of .robot. must be a text"),
     ):
-        write_profile("car", path / "car.toml", "car")
-    with pytest.raises(OutputError, match=r"Cannot write .*: File name too long"):
-        write_profile("car", tmp_path / ("x" * 300), "car")
-    with pytest.raises(UnknownName, match=r"No kind of robot matches 'kar'. Did you mean .car.\?"):
-        write_profile("kar", tmp_path / "kar.toml", "car")
-    with pytest.raises(UnknownName, match=r"No camera matches 'us'. Did you mean 'usb'\?"):
-        write_profile("car", tmp_path / "new.toml", "car", "us")
-    with pytest.raises(ProfileError, match=r"name of .robot. must be a text"):
-        write_profile("car", tmp_path / "new.toml", "")
-    assert not (tmp_path / "new.toml").exists()
+        with pytest.raises(error, match=message):
+            write_profile(*arguments)
+    assert path.read_text() == "mine"
+    assert not new.exists()
 
 
 def test_changes_keep_comments(rover: Path) -> None:
@@ -81,17 +86,11 @@ def test_changes_keep_comments(rover: Path) -> None:
         "pins = [12, 7]",
         "mix = {throttle = 0.9}",
     }
-    assert after[0] == before[0]
+    assert [line for line in after if "#" in line] == [
+        line for line in before if "#" in line and "12,  # Left." not in line
+    ]
     assert stat.S_IMODE(rover.stat().st_mode) == 0o640
     assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]
-
-
-def test_a_comment_after_a_value_is_kept(tmp_path: Path) -> None:
-    path = write_profile("car", tmp_path / "car.toml", "car")
-    rewrite(path, {"action.throttle.slew_per_s": 2.0, "output.drive.mix": {"throttle": 0.5}})
-    text = path.read_text()
-    assert "slew_per_s = 2.0                  # A quarter of a second" in text
-    assert "# Full throttle is 60 %" in text
 
 
 def test_a_change_through_a_link_changes_its_target(rover: Path, tmp_path: Path) -> None:
@@ -102,16 +101,21 @@ def test_a_change_through_a_link_changes_its_target(rover: Path, tmp_path: Path)
     assert load_profile(rover).name == "new"
 
 
-def test_a_change_that_breaks_the_profile_is_refused(rover: Path) -> None:
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("output.steer.centre_us", 2400, "must lie between left_us and right_us"),
+        ("output.stear.centre_us", 1500, "No table of rover.toml matches 'stear'. Did you mean"),
+        ("robot.name.x", 1500, "No table of rover.toml matches 'name'"),
+        ("robot.nam", "x", r"\[robot\] has no key 'nam'"),
+    ],
+)
+def test_a_change_that_breaks_the_profile_is_refused(
+    rover: Path, key: str, value: object, message: str
+) -> None:
     """The file is unchanged, and no temporary file remains."""
-    with pytest.raises(ProfileError, match="must lie between left_us and right_us"):
-        rewrite(rover, {"output.steer.centre_us": 2400})
-    with pytest.raises(UnknownName, match=r"No table of rover.toml matches 'stear'. Did you mean"):
-        rewrite(rover, {"output.stear.centre_us": 1500})
-    with pytest.raises(UnknownName, match=r"No table of rover.toml matches 'name'"):
-        rewrite(rover, {"robot.name.x": 1500})
-    with pytest.raises(ProfileError, match=r"\[robot\] has no key 'nam'"):
-        rewrite(rover, {"robot.nam": "x"})
+    with pytest.raises((ProfileError, UnknownName), match=message):
+        rewrite(rover, {key: value})
     assert rover.read_text() == EVERYTHING
     assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]
 

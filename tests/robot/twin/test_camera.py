@@ -13,7 +13,7 @@ import simplejpeg
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.start import RunningBoard, start_board
-from tests.robot.cameras.barcode import read_barcode
+from tests.robot.cameras.frames import read_barcode
 from tests.robot.twin.robots import CAR, until
 
 pytestmark = pytest.mark.realtime

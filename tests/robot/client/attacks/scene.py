@@ -19,15 +19,7 @@ WRONG = b"\x5a" * 16
 
 @dataclass
 class Scene:
-    """A robot under attack.
-
-    Attributes:
-        robot: Its processes.
-        port: Its port.
-        key: Its key.
-        operator: The person in control, whose robot is armed and at rest.
-        stack: Closes the connections.
-    """
+    """A robot under attack, and the person in control of it, armed and at rest."""
 
     robot: RunningRobot
     port: int
@@ -58,13 +50,7 @@ def movements(robot: RunningRobot) -> int:
 
 
 def settle(robot: RunningRobot, key: bytes, wait_ns: int = 50_000_000) -> None:
-    """Let an honest client see a state of the guard that is later than all that was sent.
-
-    Args:
-        robot: The robot.
-        key: Its key.
-        wait_ns: Time by which the state is later, ns.
-    """
+    """Let an honest client see a state of the guard `wait_ns` later than all that was sent."""
     with Stranger(robot.port) as honest:
         honest.enter(key, "person", name="honest")
         now_ns = honest.now_ns()

@@ -31,7 +31,6 @@ class Bh1750(I2cDevice):
         self._quantity = f"{plan.name}/light"
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Return the light, lx."""
         return {self._quantity: int.from_bytes(self.read_registers(_MEASURE, 2)) / _COUNTS_PER_LUX}
 
 
@@ -42,7 +41,6 @@ class SimulatedBh1750(SimulatedChip):
         """Take no notice of the world."""
 
     def read(self, register: int, length: int) -> list[int]:
-        """Return the measurement."""
         return list(round(LUX * _COUNTS_PER_LUX).to_bytes(length, "big"))
 
 

@@ -27,16 +27,13 @@ class Relay:
             self._coil = DigitalOutputDevice(keys.pin, pin_factory=factory)
 
     def write(self, value: float, now_ns: int) -> float:
-        """Switch the relay."""
         self._coil.value = value > 0.5
         return float(value > 0.5)
 
     def release(self) -> None:
-        """Switch it off."""
         self._coil.off()
 
     def close(self) -> None:
-        """Switch it off and close the pin."""
         self._coil.off()
         self._coil.close()
 
