@@ -1,7 +1,5 @@
 """Fingers and commands shared by tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import mujoco

@@ -1,7 +1,5 @@
 """The constants of the finger agree with their sources."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The path of a rig's commands: hold, delay, slew and resolution of the tensions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mujoco

@@ -1,7 +1,5 @@
 """The controller with a model of the finger: an upper bound for learners."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

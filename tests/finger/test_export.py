@@ -1,7 +1,5 @@
 """The finger as an MJCF file."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

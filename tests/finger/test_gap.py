@@ -1,7 +1,5 @@
 """Random fingers: their ranges, and that they can hold every posture."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -91,7 +89,6 @@ def test_without_a_finger_seed_each_episode_has_another_finger() -> None:
     ],
 )
 def test_invalid_ranges_are_refused(changes: dict[str, Any], sentence: str) -> None:
-    """Invalid ranges raise an error with name and value, also in mappings."""
     with pytest.raises(FingerError, match=sentence):
         Gap(**{**msgspec.structs.asdict(_REAL_LIKE), **changes})
     with pytest.raises(FingerError, match=sentence):

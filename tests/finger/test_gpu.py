@@ -1,7 +1,5 @@
 """Fingers on a device do what CPU envs do, whatever their motors, tendons, delays and paths."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -325,7 +323,6 @@ def test_a_finger_given_at_a_reset_moves_as_one_made_with_it() -> None:
     ],
 )
 def test_what_is_refused(arguments: dict[str, Any], sentence: str) -> None:
-    """The error says why, and what to do instead."""
     task = "FingerTrack" if "path" in arguments else "Finger"
     with pytest.raises(VectorEnvError, match=sentence):
         shapechanger.make_vec(task, 2, backend="warp", device="cpu", **arguments)

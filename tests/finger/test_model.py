@@ -1,7 +1,5 @@
 """The MuJoCo model of the finger."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

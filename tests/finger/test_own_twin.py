@@ -1,7 +1,5 @@
 """Twins that an env serves itself."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

@@ -1,7 +1,5 @@
 """Validation and JSON of finger parameters."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -48,7 +46,6 @@ def test_omitted_parameters_are_nominal() -> None:
     ],
 )
 def test_invalid_numbers_are_refused(changes: dict[str, Any], sentence: str) -> None:
-    """The error names the parameter."""
     with pytest.raises(FingerError, match=sentence):
         NOMINAL.replace(**changes)
 

@@ -1,7 +1,5 @@
 """Paths: shapes, functions, CSV files, and the laws of all of them."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import pickle
@@ -229,7 +227,6 @@ def test_a_line_rests_at_both_ends() -> None:
     ],
 )
 def test_invalid_arguments_are_refused(make: Callable[[], Any], message: str) -> None:
-    """Each argument is checked, and the error names it."""
     with pytest.raises(PathError, match=message):
         make()
 
@@ -392,7 +389,6 @@ def test_a_file_that_returns_to_its_start_is_closed(write: Callable[[str], File]
 def test_invalid_files_are_refused(
     write: Callable[[str], File], rows: list[str], message: str
 ) -> None:
-    """The error names the file and the line."""
     with pytest.raises(PathError, match=f"path.csv.*{message}"):
         from_csv(write("\n".join(["t,x,y,z", *rows, ""])))
 
@@ -445,6 +441,5 @@ def test_files_and_functions_are_paths(write: Callable[[str], File]) -> None:
     ],
 )
 def test_other_objects_are_refused(given: Any, error: type[Exception], message: str) -> None:
-    """The error lists what is accepted, and suggests the nearest shape or setting."""
     with pytest.raises(error, match=message):
         as_path(given)

@@ -1,7 +1,5 @@
 """Frames and images of a finger."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The simulated plant of a finger, and velocities from measured joint angles."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,7 +12,6 @@ from shapechanger.finger.tensions import drive_of
 
 
 def test_velocities_have_a_lag_of_40_ms() -> None:
-    """The error of a constant speed shrinks by exp(-1/2) per period of 20 ms."""
     velocities, angles = JointVelocities(), np.zeros(2)
     found = []
     for _ in range(4):

@@ -1,7 +1,5 @@
 """Postures for targets and starts, and inverse kinematics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import mujoco

@@ -1,7 +1,5 @@
 """`Finger-v1`: episodes, observations, rewards and errors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym
@@ -107,7 +105,6 @@ def test_goal_rewards_match_compute_reward() -> None:
     ],
 )
 def test_invalid_actions_are_refused(action: Any, sentence: str) -> None:
-    """The error names the tendon, and the state does not change."""
     env = FingerReachEnv()
     with pytest.raises(gym.error.ResetNeeded, match=r"Call reset\(\)"):
         env.step(_NOTHING)

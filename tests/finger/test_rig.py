@@ -1,7 +1,5 @@
 """Observations of a rig in the terms of `Finger-v1`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

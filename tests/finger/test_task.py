@@ -1,7 +1,5 @@
 """Kinematics of the fingertip, the reward, and the numbers of an observation."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Tensions that balance a torque, and the drives of the modes of action."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """`FingerTrack-v1`: paths, observations and errors."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path as File
@@ -72,7 +70,6 @@ def test_the_rms_error_starts_after_half_a_second() -> None:
 def test_a_path_that_leaves_the_workspace_is_refused(
     place: tuple[float, float, float], beyond: tuple[float, float]
 ) -> None:
-    """The error states where, when and by how much."""
     path = circle(0.012, place, hz=1.5)
     with pytest.raises(PathError, match="The path leaves the finger's reach: at ") as caught:
         FingerTrackEnv(path=path)
@@ -83,7 +80,6 @@ def test_a_path_that_leaves_the_workspace_is_refused(
 
 
 def test_a_path_that_is_too_fast_is_refused() -> None:
-    """The error states when and which torque is missing; a slower path is accepted."""
     with pytest.raises(
         PathError, match=r"too weak .* at \d.\d\d s a joint lacks .* Make it slower"
     ):

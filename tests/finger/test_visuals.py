@@ -1,7 +1,5 @@
 """Visual anatomy of the finger."""
 
-from __future__ import annotations
-
 import itertools
 
 import mujoco

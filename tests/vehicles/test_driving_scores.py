@@ -1,7 +1,5 @@
 """Results and scores of drives."""
 
-from __future__ import annotations
-
 from contextlib import closing
 
 import pytest
@@ -18,7 +16,6 @@ from shapechanger.vehicles.envs import VehicleEnv
     [(0, 0.0, 3.69), (1, 0.0253, 5.57), (10, 4.80, 18.39), (50, 37.11, 65.92)],
 )
 def test_the_interval_agrees_with_tables(count: int, low: float, high: float) -> None:
-    """Limits equal published values."""
     assert poisson_interval(count) == pytest.approx((low, high), abs=0.006)
 
 

@@ -1,7 +1,5 @@
 """Camera policies that learn from a teacher with distances."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import msgspec

@@ -1,7 +1,5 @@
 """The env of a vehicle next to its whole robot: guard, drivers and simulated chips."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from contextlib import closing

@@ -1,7 +1,5 @@
 """A simulated vehicle on a course."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Logs for the identification of fingers."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Babbling of a finger's joints."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

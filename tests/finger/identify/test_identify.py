@@ -1,7 +1,5 @@
 """Identification of a finger from a log."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """Moment arms and compliance from lengths, angles and tensions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Finger logs: validation and files."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -49,7 +47,6 @@ def with_row(name: str, row: int, value: float) -> dict[str, Any]:
     ],
 )
 def test_invalid_logs_are_rejected(changes: dict[str, Any], sentence: str) -> None:
-    """The message names the signal and the row."""
     with pytest.raises((FingerError, UnknownName), match=sentence):
         changed(made_up(), **changes)
 

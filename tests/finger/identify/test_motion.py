@@ -1,7 +1,5 @@
 """Joint and friction parameters from motion."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import importlib

@@ -1,7 +1,5 @@
 """Command signals, and motors that follow them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

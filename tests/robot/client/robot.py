@@ -56,21 +56,7 @@ def eventually(is_true: Callable[[], bool], within_s: float = 5.0) -> None:
 
 @dataclass
 class Robot:
-    """Settings and state of the robot, which tests change while it runs.
-
-    Attributes:
-        silent: Whether it stops sending, on connections that stay open.
-        delay_s: Delay of each answer, s.
-        garbage: Bytes to send instead of the next observation.
-        refusal: Reason to refuse each command; "" to accept them.
-        frozen: Whether its camera sends no new frame.
-        jpeg: Frame to send each time; None for frames that encode their number.
-        held_by: Name of another client in control; "" for none.
-        absent: Names of the features of the state without a measurement.
-        arm_by_itself: Whether its operator arms it as soon as a client takes control.
-        home_at_take: Whether it returns to its start when a client takes control.
-        messages: Messages received from clients.
-    """
+    """Settings and state of the robot, which tests change while it runs."""
 
     actions: tuple[Feature, ...] = (STEERING, THROTTLE)
     state: tuple[Feature, ...] = STATE
@@ -81,16 +67,16 @@ class Robot:
     reward: dict[str, float] = field(default_factory=dict)
     version: int = m.VERSION
     clock: str = "twin"
-    silent: bool = False
-    frozen: bool = False
-    delay_s: float = 0.0
-    garbage: bytes | None = None
-    jpeg: bytes | None = None
-    refusal: str = ""
-    held_by: str = ""
-    absent: tuple[str, ...] = ()
-    arm_by_itself: bool = False
-    home_at_take: bool = False
+    silent: bool = False  # It sends nothing, on connections that stay open.
+    frozen: bool = False  # Its camera sends no new frame.
+    delay_s: float = 0.0  # Of each answer.
+    garbage: bytes | None = None  # Sent instead of the next observation.
+    jpeg: bytes | None = None  # Sent as each frame; None for frames that encode their number.
+    refusal: str = ""  # Of each command; "" to accept them.
+    held_by: str = ""  # Another client in control.
+    absent: tuple[str, ...] = ()  # Features of the state without a measurement.
+    arm_by_itself: bool = False  # When a client takes control.
+    home_at_take: bool = False  # It returns to its start then.
     armed: bool = False
     emergency: bool = False
     stop_reason: str = ""

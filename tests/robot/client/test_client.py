@@ -1,7 +1,5 @@
 """The client against a fake robot on a real socket."""
 
-from __future__ import annotations
-
 import multiprocessing
 import traceback
 from collections.abc import Callable
@@ -58,6 +56,31 @@ def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Conne
     assert sorted(numbers) == list(range(1, 101))
 
 
+@pytest.mark.parametrize(
+    ("version", "changes", "text"),
+    [
+        (m.VERSION, {"key": new_key()}, "Wrong key"),
+        (m.VERSION, {"key": "", "fingerprint": "insecure"}, ""),  # Plain, at a robot that encrypts.
+        (0, {}, "on the robot"),
+        (2, {}, "on the workstation"),
+    ],
+    ids=["key", "plain", "older", "newer"],
+)
+def test_a_robot_that_is_not_ours_is_refused(
+    run: Run, version: int, changes: dict[str, str], text: str
+) -> None:
+    robot = run(version=version)
+    with pytest.raises((LinkError, RobotRefused), match=text):
+        RobotClient.connect(replace(robot.known, **changes), timeout_s=1.0)
+    assert robot.messages == []
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, float("nan")])
+def test_an_invalid_timeout_is_an_error(timeout_s: float) -> None:
+    with pytest.raises(LinkError, match="above 0"):
+        RobotClient.connect("192.0.2.1", timeout_s=timeout_s)
+
+
 def test_without_a_fingerprint_the_error_shows_one(run: Run) -> None:
     robot = run()
     with pytest.raises(LinkError) as refused:
@@ -77,17 +100,6 @@ def test_another_certificate_is_refused_and_both_are_shown(run: Run) -> None:
     assert robot.messages == []
 
 
-def test_a_wrong_key_is_refused(run: Run) -> None:
-    with pytest.raises(RobotRefused, match="Wrong key"):
-        RobotClient.connect(replace(run().known, key=new_key()))
-
-
-@pytest.mark.parametrize(("version", "older"), [(0, "robot"), (2, "workstation")])
-def test_another_version_is_refused(run: Run, version: int, older: str) -> None:
-    with pytest.raises(LinkError, match=f"on the {older}"):
-        RobotClient.connect(run(version=version).known)
-
-
 def test_a_missing_robot_is_one_error(run: Run, credentials: object) -> None:
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
@@ -99,11 +111,6 @@ def test_a_missing_robot_is_one_error(run: Run, credentials: object) -> None:
     assert shown.count("Traceback") == 1
     assert "aiohttp" not in shown
     assert "asyncio" not in shown
-
-
-def test_plain_connections_must_be_asked_for(run: Run) -> None:
-    with pytest.raises(LinkError):
-        RobotClient.connect(run().address, fingerprint="insecure", timeout_s=1.0)
 
 
 def test_a_refusal_to_arm_has_a_reason(run: Run, connect: Connect) -> None:
@@ -154,9 +161,3 @@ def test_a_forked_client_does_not_touch_the_connection(run: Run, connect: Connec
     answers.join_thread()
     assert child.exitcode == 0
     assert client.ask().message.seq > 0
-
-
-@pytest.mark.parametrize("timeout_s", [0.0, -1.0, float("nan")])
-def test_an_invalid_timeout_is_an_error(timeout_s: float) -> None:
-    with pytest.raises(LinkError, match="above 0"):
-        RobotClient.connect("192.0.2.1", timeout_s=timeout_s)

@@ -66,7 +66,6 @@ def test_unused_bits_of_the_high_byte_are_ignored() -> None:
 def test_missing_hardware_is_reported_on_opening(
     chips: dict[int, dict[int, int]], text: str
 ) -> None:
-    """The error names the missing chip, and the bus is closed."""
     hardware = FakeHardware(chips)
     with pytest.raises(RobotError, match=text):
         hardware.sensor("as5600", **_TWO)

@@ -79,30 +79,26 @@ def _echo(hardware: FakeHardware, seconds: float) -> None:
     hardware.factory.drive(24, 0, 1.0 + seconds)
 
 
-def test_echo_is_a_distance() -> None:
-    """The distance is half the echo time times the speed of sound, up to `max_m`."""
-    hardware = FakeHardware()
-    sonar = hardware.sensor("hcsr04", **_SONAR)
-    assert sonar.read(0, 1.0) == {}
-    _echo(hardware, 2 * 0.5 / 343.2)
-    assert sonar.read(10 * MS, 1.0)["distance"] == pytest.approx(0.5)
-    _echo(hardware, 0.038)  # Sent when there was no echo.
-    assert sonar.read(20 * MS, 1.0)["distance"] == 2.0
-    sonar.close()
+def test_echo_is_a_distance_of_pings_60_ms_apart() -> None:
+    """The distance is half the echo time times the speed of sound, up to `max_m`.
 
-
-def test_pings_are_at_least_60_ms_apart() -> None:
-    """Closer pings could receive the echo of the one before."""
+    Closer pings could receive the echo of the one before.
+    """
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
     pings: list[int] = []
     for ms in range(0, 180, 10):
         before = len(hardware.factory.log)
-        sonar.read(ms * MS, 1.0)
+        seen = sonar.read(ms * MS, 1.0)
+        assert seen == ({"distance": pytest.approx(0.5)} if pings else {})
         if len(hardware.factory.log) > before:
             pings.append(ms)
+            _echo(hardware, 2 * 0.5 / 343.2)
     assert pings == [0, 60, 120]
     assert hardware.factory.log[:2] == [("GPIO23", 1.0), ("GPIO23", 0.0)]
+    _echo(hardware, 0.038)  # Sent when there was no echo.
+    assert sonar.read(180 * MS, 1.0)["distance"] == 2.0
+    sonar.close()
 
 
 @pytest.mark.parametrize("is_real", [True, False])
@@ -162,23 +158,22 @@ def test_motion_is_in_si_units_over_the_whole_range(counts: int) -> None:
     imu.close()
 
 
-def test_gyroscope_learns_its_zero_while_the_robot_rests() -> None:
-    """The first reading at rest is the bias, and each later one moves it by 2 %."""
-    hardware = FakeHardware({0x68: _motion(0, 0, 8192, 655)})
-    imu = hardware.sensor("mpu6050")
-    assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(0.0)
-    hardware.bus.chips[0x68] |= _motion(0, 0, 8192, 1310)
-    assert imu.read(0, 1.0)["yaw_rate"] == pytest.approx(math.radians(10.0))
-    assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(0.98 * math.radians(10.0))
-
-
 @given(counts=st.integers(-32768, 32767))
-def test_gyroscope_learns_no_bias_while_turning(counts: int) -> None:
-    """A bias is below 25 deg/s."""
+def test_gyroscope_learns_its_zero_while_the_robot_rests(counts: int) -> None:
+    """The first reading at rest is the bias, if it is below 25 deg/s; later ones move it by 2 %."""
     hardware = FakeHardware({0x68: _motion(0, 0, 8192, counts)})
-    yaw_rate = hardware.sensor("mpu6050").read(0, 0.0)["yaw_rate"]
-    expected = 0.0 if abs(counts) / 65.5 < 25.0 else math.radians(counts / 65.5)
-    assert yaw_rate == pytest.approx(expected)
+    imu, rate = hardware.sensor("mpu6050"), math.radians(counts / 65.5)
+    bias = rate if abs(counts) / 65.5 < 25.0 else 0.0
+    assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(rate - bias, abs=1e-12)
+    hardware.bus.chips[0x68] |= _motion(0, 0, 8192, 655)
+    moved = math.radians(10.0)
+    assert imu.read(0, 1.0)["yaw_rate"] == pytest.approx(moved - bias)
+    if bias:
+        assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(0.98 * (moved - bias), abs=1e-12)
+    # After a loss of power all readings are 0, including gravity.
+    hardware.bus.chips[0x68] |= _motion(0, 0, 0, 0)
+    with pytest.raises(RobotError, match="lost power"):
+        imu.read(0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -194,15 +189,6 @@ def test_a_wrong_or_missing_chip_is_named(
 ) -> None:
     with pytest.raises(RobotError, match=text):
         FakeHardware(chips).sensor(driver)
-
-
-def test_a_sleeping_imu_is_reported() -> None:
-    """After a loss of power all readings are 0, including gravity."""
-    hardware = FakeHardware({0x68: _motion(0, 0, 8192, 0)})
-    imu = hardware.sensor("mpu6050")
-    hardware.bus.chips[0x68] |= _motion(0, 0, 0, 0)
-    with pytest.raises(RobotError, match="lost power"):
-        imu.read(0, 0.0)
 
 
 def test_battery_is_in_volts() -> None:

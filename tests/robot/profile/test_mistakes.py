@@ -115,7 +115,6 @@ MISTAKES = [
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake[1][:40])
 def test_mistake_is_named(mistake: tuple[str, ...]) -> None:
-    """The error gives the line of the mistake and how to fix it."""
     old, new, message, *part = mistake
     text = changed(old, new)
     with pytest.raises(ProfileError) as caught:

@@ -1,24 +1,19 @@
 """Registers of the simulated PCA9685."""
 
 import signal
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from gpiozero import DigitalOutputDevice
 
 from shapechanger.contract.plan import GuardPlan
-from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
-from tests.robot.twin.in_process import LocalBoard
-from tests.robot.twin.robots import ACTIONS, esc, process, servo
+from tests.robot.twin.robots import ACTIONS, process, servo
 
 pytestmark = pytest.mark.realtime
 
@@ -38,25 +33,6 @@ bus.write_i2c_block_data(0x40, 0x06 + 4 * 3, [0, 0, 307 & 0xFF, 307 >> 8])
 print("pulses", flush=True)
 sys.stdin.read()
 """
-
-
-def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written() -> None:
-    drive_plan = esc("drive", "wheels", {"throttle": 1.0}, **_ON_CHIP | {"channel": 0})
-    plan = replace(_SERVO_CAR, outputs=(drive_plan, *_SERVO_CAR.outputs))
-    wiring = TwinWiring(plan)
-    board = LocalBoard(wiring, DrivingWorld((), (8, 6), seed=0))
-    drive, steer = (OUTPUTS[output.driver].open(output, board.hardware) for output in plan.outputs)
-    steer.write(0.2, 0)
-    board.pins.dead_chips.add((1, 0x40))
-    with pytest.raises(RobotError, match="no chip answers"):
-        steer.write(0.4, 1)
-    assert wiring.read(board.pins.levels, 0)["steer"].value is None
-    board.pins.dead_chips.clear()
-    steer.write(0.2, 2)
-    assert wiring.read(board.pins.levels, 0)["steer"].value is None
-    drive.write(0.0, 2)
-    assert wiring.read(board.pins.levels, 0)["steer"].value == pytest.approx(0.2, abs=0.01)
-    board.hardware.close()
 
 
 def test_pulses_continue_after_the_process_dies(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Ground, water and a wall for tests of vehicles."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

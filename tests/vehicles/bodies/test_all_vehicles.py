@@ -1,7 +1,5 @@
 """Properties of all four vehicles."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

@@ -1,7 +1,5 @@
 """Counting of collisions, and the bumper."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

@@ -1,7 +1,5 @@
 """Each kind of vehicle: its parts and motors, its steering, and how it moves."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Looks of vehicles: they change no physics, and own cameras do not see what is for outside."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mujoco

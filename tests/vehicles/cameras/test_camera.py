@@ -1,7 +1,5 @@
 """The on-board camera, errors of its pose, and its faults."""
 
-from __future__ import annotations
-
 import dataclasses
 import gc
 import math

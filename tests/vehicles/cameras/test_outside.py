@@ -1,7 +1,5 @@
 """Views of a vehicle in its world from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -66,7 +64,6 @@ def test_the_own_camera_does_not_see_it(vehicle: str) -> None:
 
 @pytest.mark.parametrize("size", [(0, 48), (7, -3), (64, 5000)])
 def test_a_size_out_of_range_is_refused(size: tuple[int, int]) -> None:
-    """The message has the size that was asked for."""
     world = MujocoWorld("car", size=None)
     limit = "cannot be" if min(size) < 1 else "at most 4096 pixels a side, got"
     with pytest.raises(RenderError, match=f"{limit} {size[0]} x {size[1]}"):

@@ -1,8 +1,7 @@
 """Rectified images, and measuring a camera."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -20,6 +19,7 @@ from shapechanger.vehicles.cameras.rectify import (
 )
 
 _SIZE = (160, 120)
+_GREY = np.full((120, 160, 3), 90, np.uint8)
 
 
 def _horizon(pitch_deg: float, fovy_deg: float) -> NDArray[np.uint8]:
@@ -43,17 +43,32 @@ def test_the_horizon_is_level(pitch_deg: float, fovy_deg: float) -> None:
     assert (seen[23:] == 0).all()
 
 
-def test_a_camera_that_misses_the_view_is_refused() -> None:
-    with pytest.raises(WorldError, match=r"looks 30 degrees down .* misses 60 %"):
-        Rectifier(CameraGeometry(30.0, 48.8), _SIZE)
-    with pytest.raises(WorldError, match="vertical field of view of 20 degrees misses"):
-        Rectifier(CameraGeometry(0.0, 20.0), _SIZE)
-
-
-def test_pictures_of_another_size_are_refused() -> None:
-    rectify = Rectifier(CameraGeometry(0.0, 48.8), _SIZE)
-    with pytest.raises(WorldError, match=r"have the shape \(120, 160, 3\), got \(60, 80, 3\)"):
-        rectify(np.zeros((60, 80, 3), np.uint8))
+@pytest.mark.parametrize(
+    ("refused", "text"),
+    [
+        (
+            lambda: Rectifier(CameraGeometry(30.0, 48.8), _SIZE),
+            r"looks 30 degrees down .* misses 60 %",
+        ),
+        (
+            lambda: Rectifier(CameraGeometry(0.0, 20.0), _SIZE),
+            "vertical field of view of 20 degrees misses",
+        ),
+        (
+            lambda: Rectifier(CameraGeometry(0.0, 48.8), _SIZE)(np.zeros((60, 80, 3), np.uint8)),
+            r"have the shape \(120, 160, 3\), got \(60, 80, 3\)",
+        ),
+        (lambda: measure_camera(_GREY, (7, 5)), "no checkerboard of 7 x 5 inner corners"),
+        (lambda: measure_camera(_GREY, (7, 2)), "at least 3 inner corners"),
+        (lambda: pitch_of_horizon(121.0, 120, 48.8), "from 0 to 120"),
+    ],
+    ids=["down", "narrow", "size", "no board", "small board", "horizon"],
+)
+def test_unsuitable_images_and_cameras_are_refused(
+    refused: Callable[[], object], text: str
+) -> None:
+    with pytest.raises(WorldError, match=text):
+        refused()
 
 
 def board_picture(
@@ -108,21 +123,10 @@ def test_a_board_that_faces_the_camera_needs_the_field_of_view() -> None:
     assert found.fovy_sd_deg == 0.0
 
 
-def test_pictures_without_the_board_are_refused() -> None:
-    """The message describes the board that was searched."""
-    with pytest.raises(WorldError, match="no checkerboard of 7 x 5 inner corners"):
-        measure_camera(np.full((120, 160, 3), 90, np.uint8), (7, 5))
-    with pytest.raises(WorldError, match="at least 3 inner corners"):
-        measure_camera(np.full((120, 160, 3), 90, np.uint8), (7, 2))
-
-
 @pytest.mark.parametrize(("pitch_deg", "fovy_deg"), [(0.0, 48.8), (5.0, 48.8), (-3.0, 62.0)])
 def test_a_horizon_gives_the_pitch(pitch_deg: float, fovy_deg: float) -> None:
-    high = _SIZE[1]
     row = float((_horizon(pitch_deg, fovy_deg)[:, 0, 0] == 255).sum())
-    assert pitch_of_horizon(row, high, fovy_deg) == pytest.approx(pitch_deg, abs=0.3)
-    with pytest.raises(WorldError, match="from 0 to 120"):
-        pitch_of_horizon(121.0, high, fovy_deg)
+    assert pitch_of_horizon(row, _SIZE[1], fovy_deg) == pytest.approx(pitch_deg, abs=0.3)
 
 
 def test_the_drawing_shows_the_horizon() -> None:

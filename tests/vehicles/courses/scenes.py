@@ -1,7 +1,5 @@
 """A small hand-made course."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

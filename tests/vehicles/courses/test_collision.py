@@ -1,7 +1,5 @@
 """Collision geoms of a course."""
 
-from __future__ import annotations
-
 import mujoco
 import pytest
 

@@ -1,7 +1,5 @@
 """Properties of all courses, training and held-out, and starts on them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Rendered images of courses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Closed lines, loops on a grid, and distances, which are compared with sampled points."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Looks, textures, and meshes of walls and harbours."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,8 +1,5 @@
 """Every simulation shows what the camera of the profile sees, in one thread or more."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -42,75 +39,52 @@ def _profile(folder: Path, camera: CameraPlan, vehicle: str = "car") -> Path:
     return path
 
 
-def _waypoints(folder: Path, camera: CameraPlan, *, sensed: bool) -> NDArray[np.uint8]:
-    env = WaypointEnv("car", robot=_profile(folder, camera), sensed=sensed)
-    with closing(env):
-        return env.reset(options={"course": 11, "start": 11})[0]
+_AT = {"options": {"course": 11, "start": 11}}
 
 
-def _rectified(picture: NDArray[np.uint8], camera: CameraPlan) -> NDArray[np.uint8]:
+def _seen(by: str, folder: Path, camera: CameraPlan) -> NDArray[np.uint8]:
+    """Return what an env or a twin sees, warped as the profile states."""
+    profile = _profile(folder, camera)
+    if by.startswith("waypoints"):
+        with closing(WaypointEnv("car", robot=profile, sensed="sensed" in by)) as env:
+            return env.reset(**_AT)[0]
+    if by == "ranges":
+        with closing(RangesEnv("car", robot=profile, render_mode="rgb_array")) as env:
+            env.reset(**_AT)
+            picture: Any = env.render()
+    else:
+        place = Place() if by == "room" else course_place("corridor", "car")
+        world: Any = open_world(place, {"wheels", "steering"}, camera, 3)
+        picture = world.picture()
+        if place.opener:
+            world.close()
     assert camera.pitch_deg is not None
     assert camera.fovy_deg is not None
     return Rectifier(CameraGeometry(camera.pitch_deg, camera.fovy_deg), camera.size)(picture)
 
 
-def _ranges(folder: Path, camera: CameraPlan) -> NDArray[np.uint8]:
-    env = RangesEnv("car", robot=_profile(folder, camera), render_mode="rgb_array")
-    with closing(env):
-        env.reset(options={"course": 11, "start": 11})
-        picture = env.render()
-    assert picture is not None
-    return _rectified(picture, camera)
-
-
-def _twin(place: Place) -> Callable[[Path, CameraPlan], NDArray[np.uint8]]:
-    def seen(folder: Path, camera: CameraPlan) -> NDArray[np.uint8]:
-        world: Any = open_world(place, {"wheels", "steering"}, camera, 3)
-        picture = world.picture()
-        if place.opener:
-            world.close()
-        return _rectified(picture, camera)
-
-    return seen
-
-
-def _agree(seen: Callable[[Path, CameraPlan], NDArray[np.uint8]], folder: Path) -> None:
-    """Check that other cameras, warped as their profiles state, show what lab-car's shows."""
-    expected = seen(folder, _LAB).astype(np.float64)
+@pytest.mark.parametrize(
+    "by",
+    [
+        "room",
+        *(
+            pytest.param(by, marks=[pytest.mark.gl, pytest.mark.usefixtures("gl")])
+            for by in ("waypoints", "waypoints, sensed", "ranges", "twin")
+        ),
+    ],
+)
+def test_every_course_is_seen_by_the_camera_of_the_profile(by: str, tmp_path: Path) -> None:
+    """Frames of other cameras, warped as their profiles state, agree with those of lab-car."""
+    expected = _seen(by, tmp_path, _LAB).astype(np.float64)
     # The same image a pixel aside, which coarse pixels and edges come to.
     aside = np.abs(expected[:, 1:] - expected[:, :-1]).mean()
     for camera in _OTHERS:
-        gap = np.abs(seen(folder, camera) - expected).mean()
+        gap = np.abs(_seen(by, tmp_path, camera) - expected).mean()
         assert gap < 1.3 * aside, (camera, gap, aside)
-
-
-@pytest.mark.gl
-@pytest.mark.usefixtures("gl")
-@pytest.mark.parametrize(
-    "seen",
-    [
-        lambda folder, camera: _waypoints(folder, camera, sensed=False),
-        lambda folder, camera: _waypoints(folder, camera, sensed=True),
-        _ranges,
-        _twin(course_place("corridor", "car")),
-    ],
-    ids=["waypoints", "waypoints-robot", "ranges", "twin"],
-)
-def test_every_course_is_seen_by_the_camera_of_the_profile(
-    seen: Callable[[Path, CameraPlan], NDArray[np.uint8]], tmp_path: Path
-) -> None:
-    """Frames of other cameras, warped as their profiles state, agree with those of lab-car."""
-    _agree(seen, tmp_path)
-
-
-def test_the_room_is_seen_by_the_camera_of_the_profile(tmp_path: Path) -> None:
-    """The same holds in the plain room of a served twin."""
-    _agree(_twin(Place()), tmp_path)
 
 
 @pytest.mark.parametrize("sensed", [False, True])
 def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path, sensed: bool) -> None:
-    """The error names the profile, what is missing and ways out."""
     profile = _profile(tmp_path, CameraPlan("v4l2", (160, 120), pitch_deg=0.0, fovy_deg=41.0))
     message = (
         r"car.toml: .* 41 degrees misses 20 % .* wider frames, of its whole sensor, or a wider"

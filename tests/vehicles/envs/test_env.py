@@ -1,7 +1,5 @@
 """The env that sees a camera and sensors, and its courses and demonstrators."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -154,7 +152,6 @@ def test_a_blocked_start_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_invalid_arguments_are_refused(
     vehicle: str, arguments: Mapping[str, Any], kind: type[ShapechangerError], sentence: str
 ) -> None:
-    """Invalid arguments raise the package's errors."""
     with pytest.raises(kind, match=sentence):
         VehicleEnv(vehicle, image=False, **arguments)
 
@@ -250,7 +247,6 @@ def test_options_do_not_change_other_draws() -> None:
     ],
 )
 def test_invalid_options_are_refused(options: dict[str, Any], sentence: str) -> None:
-    """Unknown or invalid options raise errors."""
     with (
         closing(RangesEnv("car", courses=(0,))) as env,
         pytest.raises((UnknownName, WorldError), match=sentence),

@@ -1,7 +1,5 @@
 """The fast env with distances."""
 
-from __future__ import annotations
-
 import math
 from contextlib import closing
 from typing import Any

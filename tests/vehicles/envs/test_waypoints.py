@@ -1,7 +1,5 @@
 """The waypoint env, steering responses, and certificates of shifts between vehicles."""
 
-from __future__ import annotations
-
 import math
 import re
 from contextlib import closing
@@ -120,7 +118,6 @@ def test_a_drive_that_does_not_tell_the_response_is_refused() -> None:
 
 
 def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
-    """The error names the missing settings and the command that measures them."""
     lines = find_profile("lab-car").read_text().splitlines()
     path = tmp_path / "car.toml"
     path.write_text("\n".join(line for line in lines if not line.startswith("pitch_deg")))

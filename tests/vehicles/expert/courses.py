@@ -1,7 +1,5 @@
 """Hand-made courses with known walls and obstacles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from shapechanger.vehicles.courses.course import Course, Obstacle, Wall

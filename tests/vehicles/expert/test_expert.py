@@ -1,7 +1,5 @@
 """Experts: closed lines, planned paths, driving without collisions, and recovery."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Which policies may drive a robot, and a policy on board of a twin."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
@@ -73,7 +71,6 @@ def test_policies_that_fit() -> None:
     ],
 )
 def test_policies_that_do_not_fit(card: PolicyCard, robot: RobotCard, text: str) -> None:
-    """The sentence names what differs."""
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
         require_fit(card, robot, measures=False)
     assert text in str(refusal.value)

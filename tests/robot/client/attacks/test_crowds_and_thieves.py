@@ -122,7 +122,6 @@ def test_any_client_with_the_key_stops_a_thief(robot: RunningRobot) -> None:
 
 
 def test_no_log_contains_a_key_or_a_proof(robot: RunningRobot) -> None:
-    """Neither do files but the credentials, arguments, variables and the page."""
     text = (robot.folder / "credentials" / "key").read_text().strip()
     private = (robot.folder / "credentials" / "certificate.key").read_text().splitlines()[1:-1]
     secrets = [key_of(robot)]

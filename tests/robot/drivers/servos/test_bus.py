@@ -54,25 +54,28 @@ def test_setup_configures_servos_without_torque(family: str, expected: str) -> N
     assert rig.pulls() == [0.0] * 7
 
 
-def test_a_setting_that_is_not_kept_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A Feetech servo does not say that it refuses a mode, so what it has is read again."""
-    rig = Rig(of("Feetech"))
+@pytest.mark.parametrize(
+    ("family", "register", "data", "text"),
+    [
+        ("Feetech", 16, b"\7\7", r"EDC \(id 4\) does not keep 157 as maximum torque"),
+        ("Dynamixel", 98, b"\xff", r"EDC \(id 4\) refuses to set its bus watchdog to 0: the"),
+    ],
+)
+def test_a_setting_that_is_not_kept_is_an_error(
+    family: str, register: int, data: bytes, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A Feetech servo does not say that it refuses, so what it has is read again.
+
+    A Dynamixel says why, and the torque of all servos is off again.
+    """
+    rig = Rig(of(family))
     servo = rig.twin("EDC")
     taken = servo.write
-    monkeypatch.setattr(servo, "write", lambda at, data: taken(at, data if at != 16 else b"\7\7"))
-    with pytest.raises(RobotError, match=r"EDC \(id 4\) does not keep 157 as maximum torque"):
-        rig.bus.set_up()
-
-
-def test_a_refusal_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A Dynamixel says why it refuses, and the torque of all servos is off again."""
-    rig = Rig()
-    rig.bus.set_up()
-    servo = rig.twin("EDC")
-    taken = servo.write
-    monkeypatch.setattr(servo, "write", lambda at, data: taken(at, data if at != 98 else b"\xff"))
-    with pytest.raises(RobotError, match=r"EDC \(id 4\) refuses to set its bus watchdog to 0: the"):
-        rig.bus.hold()
+    monkeypatch.setattr(
+        servo, "write", lambda at, sent: taken(at, data if at == register else sent)
+    )
+    with pytest.raises(RobotError, match=text):
+        rig.prepare()
     assert not any(one.has_torque for one in rig.line.servos.values())
 
 
@@ -129,14 +132,6 @@ def test_a_stop_pulls_no_slack_tendon(ramp_ms: int, pulled: bool) -> None:
     assert rig.pulls() == [0.0] * 7
 
 
-def test_close_leaves_no_torque() -> None:
-    rig = Rig().start()
-    rig.run(5.0, 5)
-    rig.bus.close()
-    assert not any(one.has_torque for one in rig.line.servos.values())
-    assert rig.port.is_closed
-
-
 def test_flush_sends_only_while_held() -> None:
     """`flush` writes one packet without reading; the next cycle reports that the bus is gone."""
     rig = Rig()
@@ -156,3 +151,11 @@ def test_flush_sends_only_while_held() -> None:
     rig.bus.flush(grip=False)
     rig.run(None)
     assert "is gone" in rig.bus.reason
+
+
+def test_close_leaves_no_torque() -> None:
+    rig = Rig().start()
+    rig.run(5.0, 5)
+    rig.bus.close()
+    assert not any(one.has_torque for one in rig.line.servos.values())
+    assert rig.port.is_closed
