@@ -1,12 +1,15 @@
-"""Observations of a rig in the terms of `Finger-v1`."""
+"""Observations of a rig in the terms of `Finger-v1`, and twins that an env serves itself."""
 
 from pathlib import Path
+from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shapechanger.errors import RobotRefused
+import shapechanger  # noqa: F401 - Registers the ids.
+from shapechanger.errors import FingerError, RobotRefused, UnknownName
 from shapechanger.finger.anatomy import (
     JOINT_RANGE,
     JOINT_REST,
@@ -14,6 +17,8 @@ from shapechanger.finger.anatomy import (
     MOST_TENSION_N,
     TENDONS,
 )
+from shapechanger.finger.gap import GAPS, shipped_rig, with_gears
+from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.plant import JointVelocities
 from shapechanger.finger.rig import RigSenses
 from shapechanger.finger.task import fingertip
@@ -135,3 +140,47 @@ def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
         said = senses.misfit(senses.read(state, (), np.zeros(7)))
         assert f"{TENDONS[lost]} is off by" in said
         assert "robot home" in said
+
+
+def test_a_geared_finger_is_within_its_gap() -> None:
+    """Arms stay nominal, and the motors are within the ranges of the gap."""
+    geared = with_gears(NOMINAL)
+    gap = GAPS["real-like"]
+    assert geared.moment_arms == NOMINAL.moment_arms
+    for name in ("motor_kg", "tendon_damping", "tendon_friction", "motor_lag"):
+        low, high = getattr(gap, name)
+        assert low < getattr(geared, name) < high
+    drawn = gap.draw(np.random.default_rng(0))
+    assert 0.5 < drawn.motor_kg / geared.motor_kg < 2.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "sentence"),
+    [
+        ({"twin": "real-lik"}, UnknownName, "real-like"),
+        ({}, UnknownName, 'Without a rig, give twin="real-like"'),
+        ({"twin": "nominal", "finger_seed": 3}, FingerError, "selects a finger of a gap"),
+        ({"finger_seed": 3}, FingerError, "selects a finger of a gap"),
+    ],
+)
+def test_impossible_twins_are_refused(
+    arguments: dict[str, Any], error: type[Exception], sentence: str
+) -> None:
+    with pytest.raises(error, match=sentence):
+        gym.make("shapechanger/RemoteFinger-v1", **arguments)
+
+
+def test_geared_fingers_and_the_shipped_rig_have_the_path_of_its_profile() -> None:
+    """`finger identify --geared` assumes the values in a log of that rig."""
+    rig, profile = shipped_rig(), load_profile(find_profile("finger"))
+    layout = profile.action_layout()
+    spans = [(layout[name].gain, layout[name].gain_unit) for name in TENDONS]
+    assert [(most - rig.least_tension, "N") for most in rig.most_tension] == spans
+    assert rig == with_gears(rig)
+    path = GAPS["real-like"].around.path
+    assert path is not None
+    assert rig.path == path
+    assert (path.control_hz, path.tick_hz) == (profile.control_hz, profile.guard_plan().tick_hz)
+    # Equal rates up and down: tensions fall as fast as they rise.
+    slews = {(action.slew_per_s, action.slew_down_per_s) for action in profile.actions}
+    assert slews == {(path.slew_per_s, path.slew_down_per_s)} == {(path.slew_per_s,) * 2}

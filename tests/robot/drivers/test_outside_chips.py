@@ -1,4 +1,4 @@
-"""A sensor and an actuator of another package: one file each, and an entry point."""
+"""Keys of chips, and a sensor and an actuator of another package: one file each."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 
 from scripts.key_tables import with_keys
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.robot.drivers import chip
-from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS
-from shapechanger.robot.profile import Profile, read_profile, shipped_profiles
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
+from shapechanger.robot.profile import Profile, load_profile, read_profile, shipped_profiles
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.drivers.outside.bh1750 import LUX
@@ -86,3 +87,19 @@ def test_an_entry_point_must_name_a_chip(tmp_path: Path, monkeypatch: pytest.Mon
         list(SENSORS)
     assert OUTPUTS["servo"].pulses
     chip._others.cache_clear()
+
+
+@pytest.mark.parametrize("name", sorted(shipped_profiles()))
+def test_a_driver_reads_the_keys_of_its_profile_from_a_plan(name: str) -> None:
+    """The settings of a plan survive JSON, and are the same keys again."""
+    plan = load_profile(shipped_profiles()[name]).guard_plan()
+    assert GuardPlan.from_json(plan.to_json()) == plan
+    pulsed = [output for output in plan.outputs if "over" in output.settings]
+    for part, driver in (
+        *((output, OUTPUTS[output.driver]) for output in plan.outputs),
+        *((output, PULSES[output.settings["over"]]) for output in pulsed),
+        *((sensor, SENSORS[sensor.driver]) for sensor in plan.sensors),
+    ):
+        keys = driver.keys.of(part.settings)
+        assert driver.keys.of(keys.settings()) == keys
+        assert keys.settings().items() <= part.settings.items()

@@ -1,16 +1,21 @@
-"""What guard, daemon and workstation read from a profile."""
+"""What guard, daemon and workstation read from a profile, and the lines of its keys."""
 
 import datetime
 import math
+import tomllib
+from typing import Any
 
 import pytest
 from gpiozero.pins.data import PLUS_J8
+from hypothesis import given
+from hypothesis import strategies as st
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, StopPlan
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, bcm
 from shapechanger.robot.profile import load_profile, shipped_profiles
+from shapechanger.robot.profile.toml import Place, line_of
 from tests.robot.profile.texts import EVERYTHING, changed, read
 
 
@@ -145,3 +150,77 @@ def test_the_header_matches_gpiozero() -> None:
 def test_the_pins_of_2017() -> None:
     assert [bcm(f"BOARD{n}") for n in (15, 13, 11, 7)] == [22, 27, 17, 4]
     assert bcm("GPIO22") == bcm(22) == 22
+
+
+TEXT = '''\
+# [not.a.table]
+top = "]["  # Not = this.
+a.b = """
+x = 1 \\"""
+y = 2"""
+[t . "quoted name".'other']
+list = [ # [
+  { k = "}" },
+  ']',
+]
+c = \'\'\'
+[u]
+\'\'\'
+[[many]]
+v = 1
+[many.deep]
+w = 1
+[[many]]
+[[many.inner]]
+v = 2
+'''
+
+
+LINES: dict[Place, int] = {
+    ("top",): 2,
+    ("a", "b"): 3,
+    ("t",): 6,
+    ("t", "quoted name", "other"): 6,
+    ("t", "quoted name", "other", "list"): 7,
+    ("t", "quoted name", "other", "list", 0, "k"): 7,
+    ("t", "quoted name", "other", "c"): 11,
+    ("many",): 14,
+    ("many", 0, "v"): 15,
+    ("many", 0, "deep", "w"): 17,
+    ("many", 1): 18,
+    ("many", 1, "inner"): 19,
+    ("many", 1, "inner", 0, "v"): 20,
+    ("many", 1, "inner", 0, "missing", "more"): 19,
+    ("missing",): 1,
+}
+
+
+@pytest.mark.parametrize(("place", "line"), LINES.items())
+def test_multi_line_strings_arrays_and_comments_hide_no_statement(place: Place, line: int) -> None:
+    """Statements that look like others in texts and comments keep their lines."""
+    assert line_of(TEXT, place) == line
+
+
+VALUES = st.sampled_from(
+    ["1", '"a # b = c"', "'[x]'", "[1, [2], 3]", "{ p = 1, q = '}' }", '[\n"]",\n# ]\n1\n]', "1.5"]
+)
+NAMES = st.sampled_from(["a", "b", "c-d", '"e f"', "'g.h'"])
+
+
+@given(
+    tables=st.dictionaries(
+        NAMES, st.dictionaries(NAMES, VALUES, max_size=4), min_size=1, max_size=4
+    )
+)
+def test_every_key_is_found_on_its_line(tables: dict[str, dict[str, str]]) -> None:
+    text = "".join(
+        f"[{table}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()) + "\n"
+        for table, keys in tables.items()
+    )
+    data: dict[str, Any] = tomllib.loads(text)
+    lines = text.split("\n")
+    places: list[Place] = [(table,) for table in data]
+    places += [(table, key) for table, keys in data.items() for key in keys]
+    for place in places:
+        found = lines[line_of(text, place) - 1]
+        assert found.lstrip("[\"'").startswith(str(place[-1]))

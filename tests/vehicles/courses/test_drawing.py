@@ -75,18 +75,6 @@ def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
     assert picture[bottom, left].argmax() == picture[bottom, right_hand].argmax() == 2
 
 
-def test_light_and_warmth_change_the_image() -> None:
-    course, usual = square("corridor"), Look(light=0.6, warmth=0.2)
-
-    def mean(look: Look) -> NDArray[np.float64]:
-        return _draw(course, look, (0.5, 0.0), 0.0).mean(axis=(0, 1))
-
-    assert (mean(replace(usual, light=0.9)) > mean(usual) + 5).all()
-    warm, cold = mean(replace(usual, warmth=0.9)), mean(usual)
-    assert warm[2] < 0.6 * cold[2]
-    assert warm[0] > 0.95 * cold[0]
-
-
 def test_a_glossy_floor_reflects_lamps() -> None:
     course = square("corridor")
     dull, glossy = (

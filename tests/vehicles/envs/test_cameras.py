@@ -63,16 +63,9 @@ def _seen(by: str, folder: Path, camera: CameraPlan) -> NDArray[np.uint8]:
     return Rectifier(CameraGeometry(camera.pitch_deg, camera.fovy_deg), camera.size)(picture)
 
 
-@pytest.mark.parametrize(
-    "by",
-    [
-        "room",
-        *(
-            pytest.param(by, marks=[pytest.mark.gl, pytest.mark.usefixtures("gl")])
-            for by in ("waypoints", "waypoints, sensed", "ranges", "twin")
-        ),
-    ],
-)
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize("by", ["room", "waypoints", "waypoints, sensed", "ranges", "twin"])
 def test_every_course_is_seen_by_the_camera_of_the_profile(by: str, tmp_path: Path) -> None:
     """Frames of other cameras, warped as their profiles state, agree with those of lab-car."""
     expected = _seen(by, tmp_path, _LAB).astype(np.float64)

@@ -14,11 +14,10 @@ from msgspec.structs import replace
 from shapechanger.cli import main
 from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.errors import PolicyError, RobotRefused
-from shapechanger.layout import Feature, Layout
 from shapechanger.policy import PolicyCard
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.link.card import RobotCard
-from shapechanger.robot.profile.load import find_profile
+from shapechanger.robot.link.card import RobotCard, card_of
+from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from shapechanger.vehicles.remote.pilot import require_fit
@@ -26,23 +25,8 @@ from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 from tests.demos.cloning.data import clone_card
 from tests.robot.twin.robots import until
 
-_STEERING = Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in ("steering", "throttle")))
-_STATE = Layout((Feature("speed", "m/s"),))
-_CAR = RobotCard(
-    robot="my-car",
-    body="car",
-    action_layout=_STEERING.to_json(),
-    state_layout=_STATE.to_json(),
-    image_size=(160, 120),
-    control_hz=20.0,
-    deadline_ms=250,
-    max_observation_age_ms=400,
-    reward={},
-    reset=(),
-    arming="person",
-    clock="real",
-    camera_pitch_deg=0.0,
-    camera_fovy_deg=48.8,
+_CAR = replace(
+    card_of(load_profile(find_profile("lab-car")), arming="person", clock="real"),
     turning=(1.9, 0.0),
 )
 _CLONE = clone_card()
@@ -62,10 +46,10 @@ def test_policies_that_fit() -> None:
 @pytest.mark.parametrize(
     ("card", "robot", "text"),
     [
-        (clone_card(body="tank"), _CAR, "learned to steer a tank, and my-car is a car"),
-        (clone_card(control_hz=10.0), _CAR, "10 actions a second, and my-car has control_hz = 20"),
-        (_CLONE, replace(_CAR, image_size=None), "my-car has no camera"),
-        (_CLONE, replace(_CAR, action_layout=_STATE.to_json()), "those required here are speed"),
+        (clone_card(body="tank"), _CAR, "learned to steer a tank, and lab-car is a car"),
+        (clone_card(control_hz=10.0), _CAR, "10 actions a second, and lab-car has control_hz = 20"),
+        (_CLONE, replace(_CAR, image_size=None), "lab-car has no camera"),
+        (_CLONE, replace(_CAR, action_layout=ACTION_LAYOUT.to_json()), "those required here are"),
         (_WAYPOINTS, replace(_CAR, camera_pitch_deg=None), "pitch_deg and fovy_deg"),
         (_WAYPOINTS, replace(_CAR, turning=None), "turn_deg_per_m or turn_deg_per_s"),
     ],

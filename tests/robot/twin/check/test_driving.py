@@ -14,29 +14,23 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 def _checked(folder: Path, text: str, wired: str = "") -> dict[str, Finding]:
     profile = write_profile(folder, text)
-    files = folder / "robot"
-    files.mkdir()
+    (folder / "robot").mkdir()
     arguments: tuple[str, ...] = IN_A_ROOM
     if wired:
-        true = folder / "true"
-        true.mkdir()
-        arguments = ("--wired-as", str(write_profile(true, wired).path), *IN_A_ROOM)
-    with run_robot(profile, folder=files, arguments=arguments) as robot:
+        (folder / "true").mkdir()
+        arguments = ("--wired-as", str(write_profile(folder / "true", wired).path), *IN_A_ROOM)
+    with run_robot(profile, folder=folder / "robot", arguments=arguments) as robot:
         return {check.check: check for check in check_driving(robot, profile, 0.5)}
 
 
-def test_a_good_robot_passes_every_check(tmp_path: Path) -> None:
-    """The robot boots disarmed, drives forward, and stops by every means."""
-    checks = _checked(tmp_path, CAR)
-    assert [name for name, check in checks.items() if check.level != "good"] == []
-    assert {"boots disarmed", "drives", "stops by silence", "emergency stop"} <= set(checks)
-    assert "disarmed after a crash" in checks
-
-
 def test_an_encoder_that_counts_backward_is_found(tmp_path: Path) -> None:
-    """Swapped encoder pins would reward reversing."""
+    """Swapped encoder pins would reward reversing. The robot passes every other check."""
     swapped = changed("a = 5\nb = 6\n", "a = 6\nb = 5\n")
-    assert _checked(tmp_path, swapped, wired=CAR)["drives"].level == "bad"
+    checks = _checked(tmp_path, swapped, wired=CAR)
+    assert [name for name, check in checks.items() if check.level != "good"] == ["drives"]
+    assert checks["drives"].level == "bad"
+    assert {"boots disarmed", "stops by silence", "emergency stop"} <= set(checks)
+    assert "disarmed after a crash" in checks
 
 
 def test_without_an_encoder_checks_are_unknown(tmp_path: Path) -> None:
