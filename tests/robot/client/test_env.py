@@ -208,18 +208,20 @@ def test_an_action_is_clipped_or_an_error(run: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "because"),
+    ("change", "because", "interventions"),
     [
-        ({"emergency": True, "stop_reason": "The button was pressed."}, "Emergency stop: The butt"),
-        ({"armed": False}, "The robot was disarmed."),
-        ({"held_by": "Grace"}, "Grace has control of the robot now."),
+        ({"emergency": True, "stop_reason": "It was pressed."}, "Emergency stop: It", False),
+        ({"emergency": True, "stop_reason": "It was pressed."}, "Emergency stop: It", True),
+        ({"armed": False}, "The robot was disarmed.", False),
+        ({"armed": False}, "The robot was disarmed.", True),
+        ({"held_by": "Grace"}, "Grace has control of the robot now.", False),
     ],
 )
 def test_a_person_truncates_the_episode(
-    run: Run, change: dict[str, Any], because: str, started: Made
+    run: Run, change: dict[str, Any], because: str, interventions: bool, started: Made
 ) -> None:
     robot = run()
-    env = started(robot)
+    env = started(robot, interventions=interventions)
     for name, value in change.items():
         setattr(robot, name, value)
     *_, terminated, truncated, info = env.step(AHEAD)

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers import hcsr04
 from tests.robot.drivers.fakes import MS, FakeHardware
 
 _ENCODER = {"a": 5, "counts_per_turn": 20, "wheel_m": 0.2}
@@ -110,8 +109,8 @@ def test_a_ping_never_sleeps(monkeypatch: pytest.MonkeyPatch, is_real: bool) -> 
     times: list[int] = []
     real_ns = time.perf_counter_ns
     with monkeypatch.context() as patch:
-        patch.setattr(hcsr04.time, "sleep", None)
-        patch.setattr(hcsr04.time, "perf_counter_ns", lambda: times.append(real_ns()) or times[-1])
+        patch.setattr(time, "sleep", None)
+        patch.setattr(time, "perf_counter_ns", lambda: times.append(real_ns()) or times[-1])
         assert sonar.read(0, 1.0) == {}
     assert times[-1] - times[0] >= 10_000 if is_real else not times
     assert hardware.factory.log == [("GPIO23", 1.0), ("GPIO23", 0.0)]

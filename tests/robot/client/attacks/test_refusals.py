@@ -137,6 +137,7 @@ def framed(scene: Scene, *frames: bytes) -> str:
 
 
 FRAMES: Final[dict[str, tuple[str, list[bytes]]]] = {
+    "huge_claim": ("closed", [header(2**62), bytes(1000)]),
     "large_message": ("larger than", [frame(bytes(64 * 1024 + 1))]),
     "endless_fragments": (
         "closed",
