@@ -79,7 +79,8 @@ test-matrix: $(INSTALLED_DEV)  ## run the fast tests against other versions and 
 	$(RUN) scripts/test_matrix.py
 
 release: $(INSTALLED_DEV)  ## build wheel and sdist into dist/, and test them on each Python here; an hour
-	$(RUN) scripts/test_matrix.py --release
+	@! ls changelog.d/*.*.md 2>/dev/null || { echo "These are not in CHANGELOG.md yet: run towncrier build"; exit 1; }
+	$(RUN) scripts/test_matrix.py
 
 test-lerobot: $(INSTALLED_LEROBOT) $(STUBS)  ## test our robots in LeRobot; installs 6 GB
 	$(RUN) -m pyright -p $(LEROBOT)

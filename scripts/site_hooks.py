@@ -1,99 +1,98 @@
-"""Hooks of MkDocs for the site: pages made from the code, and links that leave `docs`.
+"""Hooks of MkDocs for the site, which `make docs` builds: pages from the code, and clips.
 
-`make docs` builds the site with them. The sources read the same on a code host: a link from
-`docs/a.md` to `../CONTRIBUTING.md` leads to that file there, and here to its copy in the site.
+In the site a file has its path in the repository, so that its links lead where they lead on a code
+host: from `docs/atlas.md` to `../CONTRIBUTING.md`. A page has a comment in the place of each table
+of keys of profiles and messages, such as `<!-- keys: profile limits -->`.
 """
 
 from __future__ import annotations
 
 import html
-import logging
+import json
 import posixpath
 import re
+from collections.abc import Iterable, Iterator, Mapping
+from inspect import cleandoc, formatannotation
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, get_type_hints
 
-from scripts.key_tables import with_keys
-from scripts.site_pages import SitePage, api_pages, environment_pages, wiring_pages
+import griffe
+import msgspec
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from msgspec import inspect
 
-if TYPE_CHECKING:
-    from mkdocs.config.defaults import MkDocsConfig
-    from mkdocs.structure.files import Files
-    from mkdocs.structure.pages import Page
+from scripts.site_pages import api_pages, environment_pages, wiring_pages
+from scripts.wiring_diagrams import table
+from shapechanger.robot.drivers.chip import Keys
+from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.link.messages import ClientMessage, RobotMessage
+from shapechanger.robot.profile.profile import QUANTITIES, RobotTable
+from shapechanger.robot.profile.read import DRIVERS, GIVEN, TABLES
+from shapechanger.robot.profile.toml import fields_of, permitted
 
 ROOT: Final = Path(__file__).resolve().parents[1]
-DOCS: Final = "docs"
-HOME: Final = "README.md"
-COPIES: Final = "project"
-"""Folder of the site for files outside `docs` that pages link to."""
-
-ALWAYS: Final = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
+_DOCS: Final = "docs/"
+_ALWAYS: Final = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 """Files outside `docs` that the navigation names."""
 
-_LOG: Final = logging.getLogger("mkdocs.hooks.shapechanger")
-_LINK: Final = re.compile(r"(\]\()([^)\s]+)(\))")
-_FENCE: Final = re.compile(r"(^ *```.*?^ *``` *$|^ *~~~.*?^ *~~~ *$)", re.DOTALL | re.MULTILINE)
+_LINK: Final = re.compile(r"\]\(([^)\s#]+)")
 # Words of a page of docs for the site alone: they link to pages that no code host has.
 _ONLY_HERE: Final = re.compile(r"<!-- site: (.*?) -->", re.DOTALL)
-_MERMAID: Final = re.compile(r"^```mermaid\n(.*?)^```", re.DOTALL | re.MULTILINE)
 # An image that leads to a clip: code hosts show no clips inside a page.
 _CLIP: Final = re.compile(r"\[!\[([^\]]*)\]\(([^)\s]+)\)\]\(([^)\s]+\.webm)\)")
 _SEARCH: Final = '<div class="md-search" data-md-component="search" role="dialog"'
-_SCHEME: Final = re.compile(r"[a-z]+:")
-
-
-def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Make the pages from the code, and add them to the navigation."""
-    sections = environment_pages(), wiring_pages(), api_pages()
-    config.extra["made"] = [page for pages in sections for page in pages]
-    for page in config.extra["made"]:
-        for note in page.notes:
-            _LOG.info(note)
-    config.nav = _extended(config.nav, {pages[0].path: pages for pages in sections})
-    return config
-
-
-def _extended(nav: Any, made: dict[str, list[SitePage]]) -> Any:
-    """Return the navigation with the pages of each section after its index."""
-    if isinstance(nav, str):
-        return nav
-    if isinstance(nav, dict):
-        return {title: _extended(part, made) for title, part in nav.items()}
-    entries: list[Any] = []
-    for entry in nav:
-        entries.append(_extended(entry, made))
-        if isinstance(entry, str) and entry in made:
-            entries += [{page.title: page.path} for page in made[entry] if page.path != entry]
-    return entries
+_EXAMPLE: Final = re.compile(r"(?:^>>> .*\n?(?:^(?!$).*\n?)*)+", re.MULTILINE)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages from the code, the home page, and the files that pages link to."""
-    from mkdocs.structure.files import File
 
-    for page in config.extra["made"]:
-        files.append(File.generated(config, page.path, content=page.content))
-        for name, content in page.pictures.items():
-            files.append(File.generated(config, name, content=content))
-    files.append(File.generated(config, "index.md", abs_src_path=str(ROOT / HOME)))
-    pages = [f"{DOCS}/{file.src_uri}" for file in files.documentation_pages()]
-    seen, waiting = {*pages, HOME}, [*pages, *ALWAYS]
+    def add(path: str, **source: Any) -> None:
+        file = File.generated(config, path, **source)
+        file.dest_uri = file.dest_uri.removeprefix(_DOCS)
+        files.append(file)
+
+    for file in [*files]:
+        if file.src_dir == config.docs_dir:
+            files.remove(file)
+            add(_DOCS + file.src_uri, abs_src_path=file.abs_src_path)
+    waiting = [file.src_uri for file in files.documentation_pages()]
+    seen = {*waiting}
+    waiting += _ALWAYS
     while waiting:
-        origin = waiting.pop()
-        if origin not in seen:
-            seen.add(origin)
-            path = str(ROOT / origin)
-            files.append(File.generated(config, in_site(origin), abs_src_path=path))
-        if origin.endswith(".md") and (ROOT / origin).is_file():
-            linked = links_of((ROOT / origin).read_text(), origin)
-            waiting += [one for one in linked - seen if not _in_docs(one)]
+        path = waiting.pop()
+        if path not in seen:
+            seen.add(path)
+            add(path, abs_src_path=str(ROOT / path))
+        if path.endswith(".md"):
+            for link in _LINK.findall((ROOT / path).read_text()):
+                target = posixpath.normpath(posixpath.join(posixpath.dirname(path), link))
+                if target not in seen and (ROOT / target).is_file():
+                    waiting.append(target)
+    sections: dict[str, list[str]] = {}
+    for made in (environment_pages(), wiring_pages(), api_pages()):
+        for path, content in made.items():
+            add(_DOCS + path, content=content)
+        index, *others = (_DOCS + path for path in made if path.endswith(".md"))
+        sections[index] = [index, *others]
+    config.nav = _extended(config.nav, sections)
     return files
 
 
-def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Add the tables of keys to a page, and rewrite its links to files outside `docs`."""
-    markdown = _ONLY_HERE.sub(r"\1", _MERMAID.sub(_graph_as_table, with_keys(markdown)))
-    return _CLIP.sub(_player, rewritten(markdown, origin_of(page.file.src_uri)))
+def _extended(nav: Any, sections: dict[str, list[str]]) -> Any:
+    """Return the navigation with the pages of each section after its index."""
+    if isinstance(nav, dict):
+        return {title: _extended(part, sections) for title, part in nav.items()}
+    if isinstance(nav, list):
+        return sections.get(str(nav[0])) or [_extended(part, sections) for part in nav]
+    return nav
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Add the tables of keys and the players of clips to a page."""
+    markdown = _ONLY_HERE.sub(r"\1", with_keys(markdown))
+    return _CLIP.sub(_player, markdown)
 
 
 def _player(match: re.Match[str]) -> str:
@@ -105,62 +104,110 @@ def _player(match: re.Match[str]) -> str:
     )
 
 
-def _graph_as_table(match: re.Match[str]) -> str:
-    """Return a graph of Mermaid, which browsers would load from another server, as a table."""
-    arrows = [line.split("-->") for line in match[1].splitlines() if "-->" in line]
-    rows = [f"| {one.strip()} | {', '.join(others.split('&'))} |" for one, others in arrows]
-    return "\n".join(["| from | to |", "|---|---|", *rows])
-
-
 def on_post_page(output: str, **_: Any) -> str:
     """Name the theme's search dialog for screen readers."""
     return output.replace(_SEARCH, f'{_SEARCH} aria-label="Search"', 1)
 
 
-def origin_of(src_uri: str) -> str:
-    """Return the path in the repository of a page of the site."""
-    if src_uri == "index.md":
-        return HOME
-    if src_uri.startswith(f"{COPIES}/"):
-        return src_uri.removeprefix(f"{COPIES}/")
-    return f"{DOCS}/{src_uri}"
+class FencedExamples(griffe.Extension):
+    """Put the examples of docstrings into fences; in Markdown `>>>` would quote them."""
+
+    def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
+        """Rewrite the docstrings of a package that Griffe has loaded, and of all that is in it."""
+        self._rewrite(pkg)
+
+    def _rewrite(self, obj: griffe.Object) -> None:
+        for member in obj.members.values():
+            if not isinstance(member, griffe.Alias):
+                self._rewrite(member)
+        if obj.docstring is not None:
+            obj.docstring.value = _EXAMPLE.sub(
+                lambda match: f"```pycon\n{match[0].rstrip()}\n```\n", obj.docstring.value
+            )
 
 
-def in_site(path: str) -> str:
-    """Return the path in the site of a file of the repository."""
-    if path == HOME:
-        return "index.md"
-    return path.removeprefix(f"{DOCS}/") if _in_docs(path) else f"{COPIES}/{path}"
+# Tables of keys
+
+_MARK: Final = re.compile(r"^<!-- keys: (\w+) (\w+) -->$", re.MULTILINE)
+_HEAD: Final = ("Key", "Values", "Default", "Meaning")
 
 
-def _in_docs(path: str) -> bool:
-    return path.startswith(f"{DOCS}/")
+def with_keys(markdown: str) -> str:
+    """Return a page with a table of keys in the place of each of its comments."""
+    made = {"profile": _profile_table, "messages": _messages}
+    return _MARK.sub(lambda mark: "\n\n".join(filter(None, made[mark[1]](mark[2]))), markdown)
 
 
-def links_of(markdown: str, origin: str) -> set[str]:
-    """Return the files that a page, whose path in the repository is `origin`, links to."""
-    found = {_target(link[2], origin)[0] for link in _LINK.finditer(_FENCE.sub("", markdown))}
-    return {path for path in found if path and (ROOT / path).is_file()}
+def _profile_table(name: str) -> Iterator[str]:
+    """Return the keys of a table of a profile, and of each driver that it may name."""
+    chosen = DRIVERS.get(name, {})
+    yield _keys(TABLES[name], chosen)
+    for choosing, chips in chosen.items():
+        for driver, chip in chips.items():
+            yield f'#### `{choosing} = "{driver}"`'
+            yield _documented(chip.keys)[0] if chip.keys is not Keys else "It has no more keys."
+            quantities = [
+                f"`{quantity}` ({unit})" if unit != "1" else f"`{quantity}`"
+                for quantity, (unit, _, _, measures) in QUANTITIES.items()
+                if measures == getattr(chip, "measures", "")
+            ]
+            yield f"It measures {', '.join(quantities)}." if quantities else ""
+            yield _keys([chip.keys], chosen)
+            if rows := getattr(chip, "rows", None):
+                yield f"Keys of each table `[{name}.NAME.JOINT]`:"
+                yield _keys([rows], {})
 
 
-def rewritten(markdown: str, origin: str) -> str:
-    """Return a page of the repository with its links as the site needs them."""
-    here = posixpath.dirname(in_site(origin))
+def _keys(kinds: Iterable[type], options: Mapping[str, Iterable[str]]) -> str:
+    """Return a table of the keys of some types; `options` are the names that a key can have."""
+    rows: list[tuple[str, ...]] = []
+    for kind in kinds:
+        meanings = _documented(kind)[1]
+        for name, field in fields_of(kind).items():
+            if name not in GIVEN or kind is RobotTable:
+                names = tuple(options.get(name, ()))
+                values = permitted(inspect.LiteralType(names) if names else field.type)
+                values = values.replace(Pin.description, "a pin").replace("'", '"')
+                # A default of None is no key at all.
+                meaning = re.sub(r"; None [^.;]*", "", meanings.get(name, ""))
+                rows.append((f"`{name}`", values, _default(name, field), meaning))
+    return table(_HEAD, rows) if rows else ""
 
-    def link(match: re.Match[str]) -> str:
-        path, anchor = _target(match[2], origin)
-        if not path or not (ROOT / path).is_file():  # MkDocs warns of missing files.
-            return match[0]
-        return f"{match[1]}{posixpath.relpath(in_site(path), here or '.')}{anchor}{match[3]}"
 
-    # Every second part is a fence.
-    parts = _FENCE.split(markdown)
-    return "".join(part if at % 2 else _LINK.sub(link, part) for at, part in enumerate(parts))
+def _messages(side: str) -> Iterator[str]:
+    """Return the messages of one side, the client's or the robot's, with Python's types."""
+    for kind in {"client": ClientMessage, "robot": RobotMessage}[side].__subclasses__():
+        summary, meanings = _documented(kind)
+        yield f"#### `{kind.__struct_config__.tag}`"
+        yield summary
+        rows: list[tuple[str, ...]] = []
+        types = get_type_hints(kind)
+        for name, field in fields_of(kind).items():
+            values = re.sub(r"\b[a-z]+\.", "", formatannotation(types[name])).replace(" | ", " or ")
+            rows.append((f"`{name}`", values, _default(name, field), meanings.get(name, "")))
+        yield table(_HEAD, rows) if rows else ""
 
 
-def _target(link: str, origin: str) -> tuple[str, str]:
-    """Return the path in the repository of a link, "" if it leads elsewhere, and its anchor."""
-    path, hash_, anchor = link.partition("#")
-    if not path or _SCHEME.match(link):
-        return "", ""
-    return posixpath.normpath(posixpath.join(posixpath.dirname(origin), path)), hash_ + anchor
+def _default(name: str, field: inspect.Field) -> str:
+    """Return a default as a cell; empty for a required key."""
+    value: Any = field.default
+    if value is None:
+        return "none"
+    if value is msgspec.NODEFAULT or value in ("", b"", ()):
+        return ""
+    if name in ("address", "mux"):
+        return hex(value)
+    return f"{value:.9g}" if isinstance(value, float) else json.dumps(value)
+
+
+def _documented(kind: type) -> tuple[str, dict[str, str]]:
+    """Return what the docstring of a class says before the attributes, and each one's meaning."""
+    summary, meanings = "", {}
+    for base in reversed(kind.__mro__):
+        doc = griffe.Docstring(cleandoc(base.__doc__ or ""))
+        sections = griffe.parse_google(doc, warnings=False)
+        summary = " ".join(one.value for one in sections if one.kind.value == "text")
+        for section in sections:
+            if section.kind.value == "attributes":
+                meanings |= {one.name: one.description for one in section.value}
+    return " ".join(summary.split()), meanings

@@ -5,18 +5,18 @@ from __future__ import annotations
 import importlib
 import inspect
 import io
+import logging
 import os
-from dataclasses import dataclass, field
 from functools import cache
-from itertools import groupby, takewhile
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final, cast
 
 import gymnasium as gym
 
 import shapechanger
-from scripts.wiring_diagrams import draw_wiring, part_list, pin_table
-from shapechanger.contract.env_ref import EnvRef, layouts_of
+from scripts.wiring_diagrams import draw_wiring, part_list, pin_table, table
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     NAMESPACE,
@@ -26,98 +26,87 @@ from shapechanger.envs.catalogue import (
     summaries,
 )
 from shapechanger.errors import EmptyShift, RenderError
-from shapechanger.layout import Feature, Layout
 from shapechanger.robot.profile import load_profile, shipped_profiles
 
+Pages = dict[str, str | bytes]
+"""Markdown and images, keyed by their path in `docs`; the first one is the index of the others."""
+
 SRC: Final = Path(shapechanger.__file__).parents[1]
+_LOG: Final = logging.getLogger("mkdocs.hooks.shapechanger")
 
 
-@dataclass(frozen=True)
-class SitePage:
-    """A page that is made from the code; its paths are those in the site's sources."""
-
-    path: str  # Such as `environments/Ant.md`.
-    title: str  # In the navigation.
-    content: str  # Its Markdown.
-    pictures: dict[str, bytes] = field(default_factory=dict[str, bytes])  # Keyed by path.
-    notes: tuple[str, ...] = ()  # What is missing on it, in sentences.
+def _page(*parts: str) -> str:
+    return "\n\n".join(part for part in parts if part)
 
 
 # Environments
 
 _SIZE: Final = 480, 360
 _QUALITY: Final = 80
-_FEWEST: Final = 3  # Features of one kind that become one row.
 
 
-def environment_pages() -> list[SitePage]:
+def environment_pages() -> Pages:
     """Return a page for each env that `import shapechanger` registers, and their index.
 
     The bodies of ODRL share a page.
     """
-    registered = [env_id for env_id in gym.registry if env_id.startswith(f"{NAMESPACE}/")]
-    pages = {one: environment_page(one) for one in registered if one not in ODRL_ENVS}
+    pages: Pages = {"environments/index.md": ""}
     rows: list[tuple[str, ...]] = []
-    for env_id, page in pages.items():
-        shown = f"![{page.title}]({page.title}.jpg){{ width=96 height=72 loading=lazy }}"
-        picture = f"[{shown}]({page.title}.md)" if page.pictures else ""
-        rows.append((picture, f"[`{env_id}`]({page.title}.md)", _summary(env_id)))
+    for env_id in gym.registry:
+        if not env_id.startswith(f"{NAMESPACE}/") or env_id in ODRL_ENVS:
+            continue
+        short = _short(env_id)
+        content, picture = _environment(env_id)
+        pages[f"environments/{short}.md"] = content
+        shown = ""
+        if picture is not None:
+            pages[f"environments/{short}.jpg"] = picture
+            shown = f"![{short}]({short}.jpg){{ width=96 height=72 loading=lazy }}"
+            shown = f"[{shown}]({short}.md)"
+        rows.append((shown, f"[`{env_id}`]({short}.md)", _summary(env_id)))
     rows.append(("", "[ODRL](ODRL.md)", f"{len(ODRL_ENVS)} ids: published bodies of four runners"))
-    index = [
+    pages["environments/index.md"] = _page(
         "# Environments",
         "`import shapechanger` registers these ids with Gymnasium. Their pages are made from the "
         "registry, the docstrings, the certificates and the models of this version; "
         "`shapechanger envs show ENV` prints the name, unit and range of each number.",
-        _table(("picture", "id", "body"), rows),
-    ]
+        table(("picture", "id", "body"), rows),
+    )
     bodies: list[tuple[str, ...]] = []
     for env_id, entry in ODRL_ENVS.items():
         edits = _loaded(entry.entry_point).family.body(entry.body)
         changes = ", ".join(f"`{edit}`" for edit in edits) or "none: a source"
         bodies.append((f"`{env_id}`", changes))
-    odrl = [
+    pages["environments/ODRL.md"] = _page(
         "# ODRL",
         "The sources and the targets of ODRL's locomotion tasks, as ids. Their models equal the "
         "published ones; [rewards and observations](../own-bodies.md) are our runners'.",
-        _table(("id", "edits of its family"), bodies),
-    ]
-    return [
-        SitePage("environments/index.md", "Environments", "\n\n".join(index)),
-        *pages.values(),
-        SitePage("environments/ODRL.md", "ODRL", "\n\n".join(odrl)),
-    ]
+        table(("id", "edits of its family"), bodies),
+    )
+    return pages
 
 
-def environment_page(env_id: str) -> SitePage:
-    """Return the page of an env: registry, docstring, certificate and image.
+def _environment(env_id: str) -> tuple[str, bytes | None]:
+    """Return the page of an env, from registry, docstring and certificate, and its image.
 
     Raises:
         RenderError: If nothing renders on CI, where nothing may be missing.
     """
     short, spec = _short(env_id), gym.registry[env_id]
     module, _, name = cast("str", spec.entry_point).partition(":")
-    parts = [f"# {short}", f"`{env_id}`: {_summary(env_id)}."]
-    docstring = _docstring(_loaded(f"{module}:{name}"))
-    tables: list[str] = []
-    certificate = ""
-    pictures: dict[str, bytes] = {}
-    notes: list[str] = []
+    certificate, picture = "", None
     # The others need a robot or a file.
     if not short.startswith("Remote") and env_id != OWN_ROBOT:
         env = EnvRef(env_id).make()
-        if "| Num" not in docstring:
-            for layout, title in zip(layouts_of(env), ("Observation", "Action"), strict=True):
-                tables += [f"### {title}s by number", layout_table(layout, title)]
         try:
             # Vehicles are compared by what their cameras see, too.
             certificate = _certificate(env_id, env)
             if hasattr(env.unwrapped, "picture"):
-                pictures[f"environments/{short}.jpg"] = _picture(env)
-                parts.append(f"![{short} at the start of an episode]({short}.jpg)")
+                picture = _picture(env)
         except RenderError as error:
             if os.environ.get("CI") == "true":
                 raise
-            notes.append(f"The page of {env_id} has no picture: {error}")
+            _LOG.info("The page of %s has no picture: %s", env_id, error)
         env.close()
     steps, threshold = spec.max_episode_steps, spec.reward_threshold
     given = ", ".join(f"{name}={value!r}" for name, value in spec.kwargs.items())
@@ -128,45 +117,21 @@ def environment_page(env_id: str) -> SitePage:
         "solved at a return of": "" if threshold is None else f"{threshold:,.0f}",
         "class": f"[`{module}.{name}`][{module}.{name}]",
     }
-    parts.append(_table(("property", "value"), [row for row in facts.items() if row[1]]))
-    parts += [docstring, *tables, certificate]
-    content = "\n\n".join(part for part in parts if part)
-    return SitePage(f"environments/{short}.md", short, content, pictures, tuple(notes))
-
-
-def _kind_of(feature: Feature) -> tuple[str, str, str, str]:
-    """Return the name without the element, the bounds and the unit; the units of a block differ."""
-    _, _, kind = feature.name.partition("/")
-    kind, _, part = kind.partition("/")
-    unit = "" if part else feature.unit
-    return kind or feature.name, f"{feature.low:.4g}", f"{feature.high:.4g}", unit
-
-
-def layout_table(layout: Layout, title: str) -> str:
-    """Return the table of a layout; consecutive observations of one kind share a row.
-
-    Args:
-        layout: The layout.
-        title: "Action" or "Observation".
-    """
-    rows: list[tuple[str, ...]] = [("Num", title, "Min", "Max", "Unit")]
-    first = 0
-    for (kind, low, high, _), group in groupby(layout, _kind_of):
-        features = list(group)
-        is_block = title == "Observation" and len(features) >= _FEWEST
-        for few in [features] if is_block else [[feature] for feature in features]:
-            size = sum(feature.size for feature in few)
-            place = str(first) if size == 1 else f"{first}-{first + size - 1}"
-            suffix = "/*" if few[0].name.count("/") > 1 else ""
-            name = f"`*/{kind}{suffix}`" if is_block else f"`{few[0].name}`"
-            rows.append((place, name, low, high, ", ".join(dict.fromkeys(f.unit for f in few))))
-            first += size
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    rows.insert(1, tuple("-" * width for width in widths))
-    return "\n".join(
-        f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
-        for row in rows
+    content = _page(
+        f"# {short}",
+        f"`{env_id}`: {_summary(env_id)}.",
+        f"![{short} at the start of an episode]({short}.jpg)" if picture else "",
+        table(("property", "value"), [row for row in facts.items() if row[1]]),
+        _described(f"{module}.{name}", "members: []", "show_bases: false", "heading_level: 1"),
+        certificate,
     )
+    return content, picture
+
+
+def _described(path: str, *options: str) -> str:
+    """Return where MkDocs puts the docstrings of an object, without its name."""
+    unnamed = ("show_root_heading: false", "show_root_toc_entry: false")
+    return "\n      ".join([f"::: {path}\n    options:", *unnamed, *options])
 
 
 def _short(env_id: str) -> str:
@@ -177,9 +142,7 @@ def _summary(env_id: str) -> str:
     """Return the line of the catalogue, or else the first one of the docstring."""
     if env_id in (known := summaries()):
         return known[env_id]
-    first, _, _ = (inspect.getdoc(_loaded(str(gym.registry[env_id].entry_point))) or "").partition(
-        "\n"
-    )
+    first, *_ = (inspect.getdoc(_loaded(str(gym.registry[env_id].entry_point))) or "").split("\n")
     return first[0].lower() + first[1:].rstrip(".")
 
 
@@ -203,29 +166,6 @@ def _picture(env: gym.Env[Any, Any]) -> bytes:
     return buffer.getvalue()
 
 
-def _docstring(kind: Any) -> str:
-    """Return the docstring of an env as Markdown, with its arguments and errors as tables."""
-    import griffe
-
-    from scripts.site_docstrings import fenced
-
-    doc = griffe.Docstring(fenced(inspect.getdoc(kind) or ""))
-    parts: list[str] = []
-    for section in griffe.parse_google(doc, warnings=False):
-        match section.kind.value:
-            case "text":
-                parts.append(section.value.replace("\n## ", "\n### "))
-            case "parameters":
-                rows = [(f"`{one.name}`", _cell(one.description)) for one in section.value]
-                parts += ["### Arguments", _table(("argument", "meaning"), rows)]
-            case "raises":
-                rows = [(f"`{one.annotation}`", _cell(one.description)) for one in section.value]
-                parts += ["### Errors", _table(("error", "raised"), rows)]
-            case _:
-                pass
-    return "\n\n".join(parts)
-
-
 def _certificate(env_id: str, env: gym.Env[Any, Any]) -> str:
     """Return the section on the differences of an env from the first of its kind, if it has one.
 
@@ -244,30 +184,20 @@ def _certificate(env_id: str, env: gym.Env[Any, Any]) -> str:
     return f"## Certificate\n\nChanges from {first} (`{command}`):\n\n```text\n{proven}\n```"
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _cell(text: str) -> str:
-    """Return text as the cell of a table."""
-    return " ".join(text.split()).replace("|", r"\|")
-
-
 # Wiring
 
 
-def wiring_pages() -> list[SitePage]:
+def wiring_pages() -> Pages:
     """Return a page with a diagram, pins and parts for each shipped profile, and their index."""
-    pages: list[SitePage] = []
+    pages: Pages = {"wiring/index.md": ""}
     rows: list[tuple[str, ...]] = []
     for name, path in shipped_profiles().items():
-        profile = load_profile(path)
-        comment = takewhile(lambda line: line.startswith("#"), path.read_text().splitlines())
+        profile, text = load_profile(path), path.read_text()
+        comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
         about = " ".join(line.removeprefix("#").strip() for line in comment)
-        rows.append((f"[`{name}`]({name}.md)", _cell(about)))
-        parts = [
-            "---\nhide:\n  - toc\n---",  # Room for the diagram.
+        rows.append((f"[`{name}`]({name}.md)", about))
+        pages[f"wiring/{name}.md"] = _page(
+            f"---\ntitle: {name}\nhide: [toc]\n---",  # Room for the diagram.
             f"# Wiring of the `{name}` profile",
             about,
             "Drawn from the shipped profile. Read [what must be wired](../hardware.md"
@@ -280,54 +210,30 @@ def wiring_pages() -> list[SitePage]:
             part_list(profile),
             "## Profile",
             f"`shapechanger robot init {name}` writes it:",
-            f"```toml\n{path.read_text().rstrip()}\n```",
-        ]
-        pages.append(SitePage(f"wiring/{name}.md", name, "\n\n".join(parts)))
-    index = [
+            f"```toml\n{text.rstrip()}\n```",
+        )
+    pages["wiring/index.md"] = _page(
         "# Diagrams and parts",
         "A diagram, the pins and the parts of each profile that ships, made from the profiles of "
         "this version. [Hardware](../hardware.md) says how to build it, and "
         "[profiles](../profiles.md) what each key means.",
-        _table(("profile", "robot"), rows),
-    ]
-    return [SitePage("wiring/index.md", "Diagrams and parts", "\n\n".join(index)), *pages]
+        table(("profile", "robot"), rows),
+    )
+    return pages
 
 
 # The API reference
 
-MODULES: Final = (
-    "shapechanger.layout",
-    "shapechanger.errors",
-    "shapechanger.policy",
-    "shapechanger.contract.testing",
-    "shapechanger.demos.dataset",
-    "shapechanger.demos.recording",
-    "shapechanger.envs.ant",
-    "shapechanger.envs.humanoid",
-    "shapechanger.envs.make_vec",
-    "shapechanger.envs.own",
-    "shapechanger.envs.pendulum",
-    "shapechanger.envs.reshapable",
-    "shapechanger.envs.runners",
-    "shapechanger.finger.anatomy",
-    "shapechanger.finger.parameters",
-    "shapechanger.finger.paths",
-    "shapechanger.finger.reach",
-    "shapechanger.finger.remote",
-    "shapechanger.finger.track",
-    "shapechanger.robot.client.env",
-    "shapechanger.vehicles.remote.waypoints",
-    "shapechanger.robot.client.client",
-    "shapechanger.robot.client.known_robots",
-    "shapechanger.robot.link.messages",
-    "shapechanger.transfer.study",
-    "shapechanger.transfer.learners.policy_file",
-    "shapechanger.robot.twin.operator",
-    "shapechanger.robot.twin.robot",
-)
+_MODULES: Final = """
+    layout errors policy contract.testing demos.dataset demos.recording envs.ant envs.humanoid
+    envs.make_vec envs.own envs.pendulum envs.reshapable envs.runners finger.anatomy
+    finger.parameters finger.paths finger.reach finger.remote finger.track robot.client.env
+    robot.client.client robot.client.known_robots robot.link.messages robot.twin.operator
+    robot.twin.robot transfer.learners.policy_file transfer.study vehicles.remote.waypoints
+"""
 """Modules of the reference besides the packages: they hold public names that no package exports."""
 
-HIDDEN: Final = ("shapechanger.cli", "shapechanger.robot.console")
+_HIDDEN: Final = ("shapechanger.cli.", "shapechanger.robot.console.")
 """Packages that are programs: `shapechanger --help` documents the first one."""
 
 
@@ -337,10 +243,10 @@ def public_names() -> dict[str, tuple[str, ...]]:
     found: dict[str, tuple[str, ...]] = {}
     for path in SRC.glob("shapechanger/**/__init__.py"):
         package = ".".join(path.parent.relative_to(SRC).parts)
-        if not any(f"{package}.".startswith(f"{one}.") for one in HIDDEN):
+        if not f"{package}.".startswith(_HIDDEN):
             exported = getattr(importlib.import_module(package), "__all__", ())
             found |= {package: tuple(exported)} if exported else {}
-    for module in MODULES:
+    for module in (f"shapechanger.{name}" for name in _MODULES.split()):
         has = vars(importlib.import_module(module))
         known = has.get("__annotations__", {})
         found[module] = tuple(
@@ -352,50 +258,45 @@ def public_names() -> dict[str, tuple[str, ...]]:
     return dict(sorted(found.items()))
 
 
-def api_pages() -> list[SitePage]:
+def api_pages() -> Pages:
     """Return a page for each public package and module, and their index.
 
     The innermost page that has a name describes it, and the others link to it.
     """
+    rows: list[tuple[str, ...]] = []
+    pages: Pages = {"api/index.md": "", **{f"api/{page}.md": "" for page in public_names()}}
     described: dict[tuple[str, int], str] = {}
-    pages: list[SitePage] = []
     for page, names in sorted(public_names().items(), key=lambda one: -one[0].count(".")):
-        members: list[str] = []
-        links: list[str] = []
         module = importlib.import_module(page)
+        members: dict[str, str] = {}
+        links: list[str] = []
         for name in names:
             key = name, id(getattr(module, name))
             if key in described:
                 links.append(f"[`{name}`][{described[key]}]")
             else:
-                members.append(name)
-                described[key] = reference_path(page, name)
-        options = ["show_root_heading: false", "show_root_toc_entry: false"]
-        options.append(f"members: [{', '.join(members)}]")
-        lines = [f"::: {page}", "    options:", *(f"      {option}" for option in options)]
-        parts = [f"# `{page}`", "\n".join(lines)]
+                members[name] = described[key] = reference_path(page, name)
         # A module hides what it defines under its own name.
-        paths = [(name, reference_path(page, name)) for name in members]
-        parts += [f"::: {path}" for name, path in paths if path.endswith(f".{name}.{name}")]
-        parts += ["## Re-exported", ", ".join(links) + "."] if links else []
-        title = page.removeprefix("shapechanger.")
-        pages.append(SitePage(f"api/{page}.md", title, "\n\n".join(parts)))
-    pages.sort(key=lambda page: page.path)
-    rows = [(f"[`{one}`]({one}.md)", _first_line(one)) for one in public_names()]
-    index = [
+        hidden = [path for name, path in members.items() if path.endswith(f".{name}.{name}")]
+        pages[f"api/{page}.md"] = _page(
+            f"---\ntitle: {page.removeprefix('shapechanger.')}\n---",
+            f"# `{page}`",
+            _described(page, f"members: [{', '.join(members)}]"),
+            *(f"::: {path}" for path in hidden),
+            f"## Re-exported\n\n{', '.join(links)}." if links else "",
+        )
+        summary, *_ = (module.__doc__ or "").split("\n\n")
+        rows.append((page, f"[`{page}`]({page}.md)", summary))
+    pages["api/index.md"] = _page(
         "# API reference",
         "Every name that a package exports, with shapes, units and errors. The names of "
         "`shapechanger` itself are imported on first use.",
-        _table(("package", "contents"), rows),
-    ]
-    return [SitePage("api/index.md", "API", "\n\n".join(index)), *pages]
+        table(("package", "contents"), [row[1:] for row in sorted(rows)]),
+    )
+    return pages
 
 
 def reference_path(package: str, name: str) -> str:
     """Return the path by which the reference knows an exported name."""
     module = SRC / package.replace(".", "/") / f"{name}.py"
     return f"{package}.{name}.{name}" if module.exists() else f"{package}.{name}"
-
-
-def _first_line(module: str) -> str:
-    return _cell((importlib.import_module(module).__doc__ or "").partition("\n\n")[0])

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import re
+from itertools import groupby
 
 import gymnasium as gym
 import pytest
 
-from scripts.site_pages import layout_table
 from shapechanger.contract.env_ref import layouts_of
-
-pytestmark = pytest.mark.sources  # The scripts.
+from shapechanger.layout import Feature, Layout
 
 IDS = (
     *("InvertedPendulum", "InvertedDoublePendulum", "Ant", "ExtendedAnt", "HalfCheetah"),
@@ -36,5 +36,31 @@ def test_a_docstring_is_a_page_of_the_env(name: str) -> None:
         assert layout is not None
         if len(layout) == 1 and layout.size > 1:
             continue  # An image.
-        table = layout_table(layout, title)
-        assert table in page, f"The table of {title.lower()}s must be:\n{table}"
+        lines = re.findall(rf"^\| Num +\| {title} .*\n(?:\|.*\n)*", f"{page}\n", re.MULTILINE)
+        rows = [re.split(r" *\| *", line)[1:-1] for line in lines[0].splitlines()[2:]]
+        assert rows == table(layout, title)
+
+
+def table(layout: Layout, title: str) -> list[list[str]]:
+    """Return the rows that describe a layout: three observations of one kind or more share one."""
+    rows: list[list[str]] = []
+    first = 0
+    for (kind, low, high, _), group in groupby(layout, kind_of):
+        features = list(group)
+        is_block = title == "Observation" and len(features) > 2
+        for few in [features] if is_block else [[feature] for feature in features]:
+            size = sum(feature.size for feature in few)
+            place = str(first) if size == 1 else f"{first}-{first + size - 1}"
+            suffix = "/*" if few[0].name.count("/") > 1 else ""
+            name = f"`*/{kind}{suffix}`" if is_block else f"`{few[0].name}`"
+            rows.append([place, name, low, high, ", ".join(dict.fromkeys(f.unit for f in few))])
+            first += size
+    return rows
+
+
+def kind_of(feature: Feature) -> tuple[str, str, str, str]:
+    """Return the name without the element, the bounds and the unit; the units of a block differ."""
+    _, _, kind = feature.name.partition("/")
+    kind, _, part = kind.partition("/")
+    unit = "" if part else feature.unit
+    return kind or feature.name, f"{feature.low:.4g}", f"{feature.high:.4g}", unit

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.key_tables import with_keys
+from scripts.site_hooks import with_keys
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.key_tables import with_keys
+from scripts.site_hooks import with_keys
 from shapechanger.robot.cameras.camera import CAMERAS
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.link.messages import ClientMessage, RobotMessage
@@ -49,4 +49,5 @@ def test_every_message_is_on_the_wire() -> None:
     page = with_keys((DOCS / "wire.md").read_text())
     for kind in (*ClientMessage.__subclasses__(), *RobotMessage.__subclasses__()):
         assert f"#### `{kind.__name__.lower()}`" in page
-    assert '| `pace` | "lockstep" or "realtime" | "realtime" |' in page
+    assert "| `pace` | Literal['realtime', 'lockstep'] | \"realtime\" |" in page
+    assert "| `seq` | int or None | none |" in page
