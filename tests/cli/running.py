@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import pytest
 
 from shapechanger.cli import main
+
+
+class Printed(NamedTuple):
+    """What a command has printed."""
+
+    out: str
+    err: str
 
 
 class Cli:
@@ -19,19 +28,25 @@ class Cli:
         self._capsys = capsys
         self._group = group
 
-    def output(self, *words: object) -> str:
-        """Return the standard output of a command."""
+    def ended(self, code: int, *words: object) -> Printed:
+        """Return the output and the errors of a command that ends with an exit code."""
         self._capsys.readouterr()
-        main([*self._group, *map(str, words)])
-        return self._capsys.readouterr().out
+        found: object = 0
+        try:
+            main([*self._group, *map(str, words)])
+        except SystemExit as stop:
+            found = stop.code or 0
+        printed = Printed(*self._capsys.readouterr())
+        assert found == code, printed
+        return printed
+
+    def output(self, *words: object) -> str:
+        """Return the standard output of a command that succeeds."""
+        return self.ended(0, *words).out
 
     def refused(self, *words: object) -> str:
         """Return the error of a command, which is one sentence, after exit code 2."""
-        self._capsys.readouterr()
-        with pytest.raises(SystemExit) as stop:
-            main([*self._group, *map(str, words)])
-        message = self._capsys.readouterr().err
-        assert stop.value.code == 2, message
+        message = self.ended(2, *words).err
         assert message.startswith("error: ")
         assert message.count("\n") == 1, message
         return message

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapechanger.cli.robot.serve import place_of
-from shapechanger.errors import ProfileError, RobotError, UnknownName, WorldError
+from shapechanger.errors import ProfileError, RobotError
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import finger_place
@@ -55,19 +55,3 @@ def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path)
     assert place_of(odd, "", ()) == Place()
     with pytest.raises(ProfileError, match="a car is driven by"):
         place_of(odd, "corridor", ())
-
-
-def test_unknown_worlds_and_lenses_are_refused() -> None:
-    car = _shipped("lab-car")
-    with pytest.raises(UnknownName, match=r"No world matches 'coridor'. Did you mean 'corridor'"):
-        place_of(car, "coridor", ())
-    with pytest.raises(UnknownName, match=r"No lens matches 'nihgt'. Did you mean 'night'"):
-        place_of(car, "", ("nihgt",))
-    with pytest.raises(ProfileError, match="no cat in MuJoCo, only car, tank, truck, boat; --wor"):
-        place_of(_shipped("cat"), "corridor", ())
-    with pytest.raises(WorldError, match="A car does not float: it cannot drive in a harbour"):
-        place_of(car, "harbour", ())
-    with pytest.raises(WorldError, match="A boat floats: it cannot drive in a yard"):
-        place_of(_shipped("lab-boat"), "yard", ())
-    with pytest.raises(RobotError, match="plain camera: choose a --world for a --lens"):
-        place_of(car, "room", ("night",))

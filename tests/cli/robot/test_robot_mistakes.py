@@ -7,24 +7,32 @@ import shutil
 import socket
 import tempfile
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from shapechanger.cli import main
 from shapechanger.cli.robot.check import ask_person
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.discovery import FoundRobot
 from shapechanger.robot.link.address import Address
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.twin.start import start_board
+from tests.cli.running import Cli
 from tests.robots import CAR, IN_A_ROOM, changed, write_profile
 
 pytestmark = pytest.mark.realtime
 
-Run = Callable[..., tuple[int, str, str]]
+WITHOUT_PINS = pytest.mark.skipif(
+    any(Path("/dev").glob("gpiochip*")), reason="This machine has pins."
+)
 KEY = "F3KI-CLDB-JQNI-LWGB-LOBU-SJPT-5E"
+
+
+@pytest.fixture
+def robot(capsys: pytest.CaptureFixture[str]) -> Cli:
+    """The commands `shapechanger robot ...`."""
+    return Cli(capsys, "robot")
 
 
 @pytest.fixture(autouse=True)
@@ -45,22 +53,6 @@ def home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     shutil.rmtree(tmp_path)
 
 
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """Run a command and return its exit code, standard output and standard error."""
-
-    def ran(*arguments: str) -> tuple[int, str, str]:
-        code = 0
-        try:
-            main(["robot", *arguments])
-        except SystemExit as exit_:
-            code = int(exit_.code or 0)
-        printed = capsys.readouterr()
-        return code, printed.out, printed.err
-
-    return ran
-
-
 def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
@@ -72,87 +64,80 @@ def write_ready_profile(home: Path, text: str = CAR) -> str:
     return str(profile.path)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        ("init nocar", "No kind of robot matches 'nocar'"),
-        ("init car --name ../up", "name"),
-        ("serve nocar", "No profile matches 'nocar'. Did you mean 'car'?"),
-        ("serve nowhere.toml", "There is no file nowhere.toml"),
-        ("serve twice.toml", "22"),
-        ("serve tank", "Run `shapechanger robot init`"),
-        ("serve test-car.toml --clock twin", "--clock twin needs --twin"),
-        ("serve test-car.toml --wired-as car", "--wired-as needs --twin"),
-        ("serve test-car.toml --twin-folder .", "--twin-folder needs --twin"),
-        ("serve test-car.toml --twin --port 99999", "A port is"),
-        ("serve test-car.toml --twin --port 0 --host 203.0.113.1", "Cannot listen at"),
-        ("serve test-car.toml --twin --wired-as nowhere.toml", "There is no file nowhere.toml"),
-        ("serve test-car.toml --twin --twin-folder nowhere", "There is no folder"),
-        ("serve test-car.toml --twin --twin-folder stale", "A twin has left"),
-        ("safe-pins nocar", "No profile matches 'nocar'"),
-        ("check nocar", "No profile matches 'nocar'"),
-        ("check test-car.toml", "lift its wheels"),
-        ("check test-car.toml --cap 0", "The cap is above 0"),
-        ("check test-car.toml --leds --twin --cap 7", "The cap is above 0"),
-        ("check test-car.toml --wiring --cap 0.5", "--cap needs a check that drives"),
-        ("check test-car.toml --faults --trials 0", "At least one trial"),
-        ("check test-car.toml --faults --leds", "Choose one of --leds and --faults"),
-        ("check test-car.toml --yes", "--yes needs --leds"),
-        ("check test-car.toml --twin --leds --probe 20", "A twin needs no --probe"),
-        ("check test-car.toml --leds --probe 22", "Pin 22 is used by drive forward"),
-        ("check test-car.toml --leds --probe 40", "GPIO0 to GPIO27, got 40"),
-        ("check finger --twin --leds", "which LEDs cannot replace"),
-        ("check finger --faults", "there is nothing to stop"),
-        ("check test-car.toml --leds --twin --trials 3", "--trials needs --faults"),
-        ("check test-car.toml --no-one-shot", "--no-one-shot needs --faults"),
-        ("check test-car.toml --twin --jumper 20 21", "--jumper goes with none of --twin"),
-        ("check test-car.toml --leds --wheels-up", "--wheels-up goes with none of --twin"),
-        ("check test-car.toml --twin --motors-off", "--motors-off goes with none of --twin"),
-        ("check test-car.toml --wheels-up --jumper 20 28", "GPIO0 to GPIO27, got 28"),
-        ("check test-car.toml --wheels-up --jumper 20 20", "A jumper joins two pins"),
-        ("check test-car.toml --wiring --port 99999", "A port is 0"),
-        ("serve test-car.toml --twin --policy nowhere", "There is no policy file or folder"),
-        ("init", "Name the kind of the new robot"),
-        ("init car --camera usb --name ../up", "name"),
-        ("install nowhere.toml", "There is no file nowhere.toml"),
-        ("serve test-car.toml --world room", "--world needs --twin"),
-        ("serve test-car.toml --lens night", "--lens needs --twin"),
-        ("serve test-car.toml --twin --port 0 --world coridor", "Did you mean 'corridor'?"),
-        ("serve test-car.toml --twin --port 0 --world room --lens dirt", "choose a --world for"),
-        ("serve test-car.toml --twin --port 0 --lens nihgt", "Did you mean 'night'?"),
-        ("serve cat --twin --port 0 --world corridor", "there is no cat in MuJoCo"),
-        ("serve car --twin --port 0 --world harbour", "A car does not float"),
-        ("serve finger --gap real-like", "--gap needs --twin"),
-        ("serve finger --twin --port 0 --finger-seed 3", "selects a finger of a --gap"),
-        ("serve finger --twin --port 0 --gap real-lik", "Did you mean 'real-like'?"),
-        ("serve finger --twin --port 0 --gap wide --world room", "give only one of them"),
-        ("serve test-car.toml --twin --port 0 --gap wide", "A --gap is between fingers"),
-        ("install car", "`shapechanger robot init car` writes your own"),
-        ("home finger", "`shapechanger robot init finger` writes your own"),
-        ("home test-car.toml --straight", "no tendons on a servo bus"),
-        ("serve test-car.toml --seed 4", "--seed needs --twin"),
-        ("serve test-car.toml --twin --seed -1", "A seed is a whole number from 0 to"),
-        (f"serve test-car.toml --twin --seed {2**63}", "A seed is a whole number from 0 to"),
-        (f"serve finger --twin --gap wide --finger-seed {2**32}", "A seed is a whole number"),
-        ("calibrate test-car.toml", "lift its wheels"),
-        ("calibrate car", "`shapechanger robot init car` writes your own"),
-        ("calibrate test-car.toml --cap 2", "The cap is above 0"),
-        ("calibrate test-car.toml --twin", "needs a terminal"),
-        ("drive nobody", "No known robot matches 'nobody'"),
-        ("drive nobody --cap 0", "The cap is above 0"),
-        ("key nobody", "No robot of this machine matches 'nobody'. There are: test-car."),
-        ("key test-cat", "Did you mean 'test-car'?"),
-        ("key test-car --credentials nowhere", "nowhere/key does not exist"),
-        ("stop nobody", "No known robot matches 'nobody'"),
-        ("forget nobody", "No known robot matches 'nobody'"),
-        ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),
-        ("remember one 127.0.0.1:99999 --fingerprint insecure", "a port from 1 to 65535"),
-        ("remember ../one 127.0.0.1 --fingerprint insecure", "robot's name has up to 64"),
-        ("find --seconds 0", "more than 0 s"),
-    ],
+MISTAKES = (
+    ("init nocar", "No kind of robot matches 'nocar'"),
+    ("init car --name ../up", "name"),
+    ("init", "Name the kind of the new robot"),
+    ("serve nocar", "No profile matches 'nocar'. Did you mean 'car'?"),
+    ("serve nowhere.toml", "There is no file nowhere.toml"),
+    ("serve twice.toml", "22"),
+    ("serve tank", "Run `shapechanger robot init`"),
+    ("serve test-car.toml --clock twin", "--clock twin needs --twin"),
+    ("serve test-car.toml --wired-as car", "--wired-as needs --twin"),
+    ("serve test-car.toml --twin-folder .", "--twin-folder needs --twin"),
+    ("serve test-car.toml --world room", "--world needs --twin"),
+    ("serve test-car.toml --lens night", "--lens needs --twin"),
+    ("serve test-car.toml --seed 4", "--seed needs --twin"),
+    ("serve finger --gap real-like", "--gap needs --twin"),
+    ("serve test-car.toml --twin --port 99999", "A port is"),
+    ("serve test-car.toml --twin --port 0 --host 203.0.113.1", "Cannot listen at"),
+    ("serve test-car.toml --twin --twin-folder nowhere", "There is no folder"),
+    ("serve test-car.toml --twin --twin-folder stale", "A twin has left"),
+    ("serve test-car.toml --twin --policy nowhere", "There is no policy file or folder"),
+    ("serve test-car.toml --twin --port 0 --world coridor", "Did you mean 'corridor'?"),
+    ("serve test-car.toml --twin --port 0 --world room --lens dirt", "choose a --world for"),
+    ("serve test-car.toml --twin --port 0 --lens nihgt", "Did you mean 'night'?"),
+    ("serve cat --twin --port 0 --world corridor", "there is no cat in MuJoCo"),
+    ("serve car --twin --port 0 --world harbour", "A car does not float"),
+    ("serve lab-boat --twin --port 0 --world yard", "A boat floats: it cannot drive in a yard"),
+    ("serve finger --twin --port 0 --finger-seed 3", "selects a finger of a --gap"),
+    ("serve finger --twin --port 0 --gap real-lik", "Did you mean 'real-like'?"),
+    ("serve finger --twin --port 0 --gap wide --world room", "give only one of them"),
+    ("serve test-car.toml --twin --port 0 --gap wide", "A --gap is between fingers"),
+    ("serve test-car.toml --twin --seed -1", "A seed is a whole number from 0 to"),
+    (f"serve finger --twin --gap wide --finger-seed {2**32}", "A seed is a whole number"),
+    ("safe-pins nocar", "No profile matches 'nocar'"),
+    ("check test-car.toml", "lift its wheels"),
+    ("check test-car.toml --cap 0", "The cap is above 0"),
+    ("check test-car.toml --wiring --cap 0.5", "--cap needs a check that drives"),
+    ("check test-car.toml --faults --trials 0", "At least one trial"),
+    ("check test-car.toml --faults --leds", "Choose one of --leds and --faults"),
+    ("check test-car.toml --yes", "--yes needs --leds"),
+    ("check test-car.toml --twin --leds --probe 20", "A twin needs no --probe"),
+    ("check test-car.toml --leds --probe 22", "Pin 22 is used by drive forward"),
+    ("check test-car.toml --leds --probe 40", "GPIO0 to GPIO27, got 40"),
+    ("check finger --twin --leds", "which LEDs cannot replace"),
+    ("check finger --faults", "there is nothing to stop"),
+    ("check test-car.toml --leds --twin --trials 3", "--trials needs --faults"),
+    ("check test-car.toml --no-one-shot", "--no-one-shot needs --faults"),
+    ("check test-car.toml --twin --jumper 20 21", "--jumper goes with none of --twin"),
+    ("check test-car.toml --leds --wheels-up", "--wheels-up goes with none of --twin"),
+    ("check test-car.toml --twin --motors-off", "--motors-off goes with none of --twin"),
+    ("check test-car.toml --wheels-up --jumper 20 28", "GPIO0 to GPIO27, got 28"),
+    ("check test-car.toml --wheels-up --jumper 20 20", "A jumper joins two pins"),
+    ("install car", "`shapechanger robot init car` writes your own"),
+    ("home finger", "`shapechanger robot init finger` writes your own"),
+    ("home test-car.toml --straight", "no tendons on a servo bus"),
+    ("calibrate test-car.toml", "lift its wheels"),
+    ("calibrate car", "`shapechanger robot init car` writes your own"),
+    ("calibrate test-car.toml --cap 2", "The cap is above 0"),
+    ("calibrate test-car.toml --twin", "needs a terminal"),
+    ("drive nobody", "No known robot matches 'nobody'"),
+    ("drive nobody --cap 0", "The cap is above 0"),
+    ("key test-cat", "Did you mean 'test-car'?"),
+    ("key test-car --credentials nowhere", "nowhere/key does not exist"),
+    ("stop nobody", "No known robot matches 'nobody'"),
+    ("forget nobody", "No known robot matches 'nobody'"),
+    ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),
+    ("remember one 127.0.0.1:99999 --fingerprint insecure", "a port from 1 to 65535"),
+    ("remember ../one 127.0.0.1 --fingerprint insecure", "robot's name has up to 64"),
+    ("find --seconds 0", "more than 0 s"),
 )
+
+
+@pytest.mark.parametrize(("command", "text"), MISTAKES)
 def test_one_sentence(
-    run: Run, home: Path, monkeypatch: pytest.MonkeyPatch, arguments: str, text: str
+    robot: Cli, home: Path, monkeypatch: pytest.MonkeyPatch, command: str, text: str
 ) -> None:
     """Exit code 2, and no new file or process."""
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
@@ -161,69 +146,52 @@ def test_one_sentence(
     (home / "work" / "stale").mkdir()
     (home / "work" / "stale" / "ledger.jsonl").touch()
     before = files(home)
-    code, _, output = run(*arguments.split())
-    assert code == 2
-    assert output.startswith("error: ")
-    assert text in output
-    assert output.count("\n") == 1
+    assert text in robot.refused(*command.split())
     assert files(home) == before
 
 
-def test_the_key_is_asked_for(run: Run) -> None:
+def test_the_key_is_asked_for(robot: Cli) -> None:
     """The key must not be given on the command line."""
-    code, _, output = run("remember", "one", "127.0.0.1", "--fingerprint", "insecure")
-    assert code == 2
-    assert "SHAPECHANGER_KEY" in output
+    command = ("remember", "one", "127.0.0.1", "--fingerprint", "insecure")
+    assert "SHAPECHANGER_KEY" in robot.refused(*command)
 
 
-def test_a_port_in_use(run: Run, home: Path) -> None:
+def test_a_port_in_use(robot: Cli, home: Path) -> None:
     path = write_ready_profile(home)
     before = files(home / "work")
     with socket.create_server(("127.0.0.1", 0)) as other:
-        port = other.getsockname()[1]
-        code, _, output = run(
-            "serve", path, "--twin", "--port", str(port), "--no-announce", *IN_A_ROOM
-        )
-    assert code == 2
-    assert "Is the robot served already?" in output
+        options = ("--twin", "--port", other.getsockname()[1], "--no-announce", *IN_A_ROOM)
+        assert "Is the robot served already?" in robot.refused("serve", path, *options)
     assert files(home / "work") == before
 
 
-def test_a_twin_on_another_clock(run: Run, home: Path) -> None:
+def test_a_twin_on_another_clock(robot: Cli, home: Path) -> None:
     path, folder = write_ready_profile(home), home / "work" / "twin"
     folder.mkdir()
     with start_board(load_profile(path).guard_plan(), "real", folder):
-        options = ("--twin", "--port", "0", "--no-announce", "--twin-folder", str(folder))
-        code, _, output = run("serve", path, *options, *IN_A_ROOM, "--clock", "twin")
-    assert code == 2
-    assert "runs on --clock real" in output
+        options = ("--twin", "--port", "0", "--no-announce", "--twin-folder", folder, *IN_A_ROOM)
+        told = robot.refused("serve", path, *options, "--clock", "twin")
+    assert "runs on --clock real" in told
 
 
-def test_init_never_overwrites(run: Run, home: Path) -> None:
-    code, output, _ = run("init", "car", "--name", "rover")
-    assert code == 0
+def test_init_never_overwrites(robot: Cli, home: Path) -> None:
+    """Neither profile nor key; another profile of the same name has the same key."""
+    output = robot.output("init", "car", "--name", "rover")
     key = next(line.split()[1] for line in output.splitlines() if line.startswith("key  "))
     profile = home / "work" / "rover.toml"
-    text = profile.read_text() + "# Mine.\n"
-    profile.write_text(text)
+    profile.write_text(profile.read_text() + "# Mine.\n")
     before = {path: path.read_bytes() for path in home.rglob("*") if path.is_file()}
-    code, _, output = run("init", "car", "--name", "rover")
-    assert code == 2
-    assert "it exists" in output
+    assert "it exists" in robot.refused("init", "car", "--name", "rover")
     profile.rename(profile.with_name("other.toml"))
-    code, output, _ = run("init", "car", "--name", "rover")
-    assert code == 0
-    assert key in output
-    profile.unlink()
-    profile.with_name("other.toml").rename(profile)
+    assert key in robot.output("init", "car", "--name", "rover")
+    profile.with_name("other.toml").replace(profile)
     assert {path: path.read_bytes() for path in before} == before
 
 
-def test_the_key_can_be_shown_again(run: Run, home: Path) -> None:
+def test_the_key_can_be_shown_again(robot: Cli, home: Path) -> None:
     """The output matches `init`'s, with the full fingerprint."""
-    _, made, _ = run("init", "car", "--name", "rover")
-    code, output, _ = run("key", "rover")
-    assert code == 0
+    made = robot.output("init", "car", "--name", "rover")
+    output = robot.output("key", "rover")
     assert all(part in made for part in output.strip().split("\n\n"))
     known = tomllib.loads((home / "config" / "shapechanger" / "known" / "rover.toml").read_text())
     assert f"key          {known['key']}\n" in output
@@ -231,39 +199,37 @@ def test_the_key_can_be_shown_again(run: Run, home: Path) -> None:
     assert "shapechanger robot remember rover " in output
 
 
-def test_a_profile_in_this_folder_is_found_by_its_name(run: Run, home: Path) -> None:
+@WITHOUT_PINS
+def test_a_profile_in_this_folder_is_found_by_its_name(robot: Cli, home: Path) -> None:
     """A shipped profile of that name takes precedence."""
     write_ready_profile(home)
-    _, output, _ = run("check", "test-car", "--wiring", "--port", "0")
+    wiring = ("--wiring", "--port", "0")
+    output = robot.ended(1, "check", "test-car", *wiring).out
     assert "good  profile: test-car.toml is valid" in output
     (home / "work" / "car.toml").write_text("broken")
-    _, output, _ = run("check", "car", "--wiring", "--port", "0")
-    assert "shipped" in output
+    assert "shipped" in robot.ended(1, "check", "car", *wiring).out
 
 
-def test_stopping_a_robot_that_is_off(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stopping_a_robot_that_is_off(robot: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit code 1, and an error that the stop was not confirmed."""
     with socket.create_server(("127.0.0.1", 0)) as unused:
         address = f"127.0.0.1:{unused.getsockname()[1]}"
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
-    assert run("remember", "off", address, "--fingerprint", "ab" * 32)[0] == 0
-    code, output, wrong = run("stop", "off")
-    assert (code, output) == (1, "")
-    assert "The stop was not confirmed" in wrong
+    robot.output("remember", "off", address, "--fingerprint", "ab" * 32)
+    ended = robot.ended(1, "stop", "off")
+    assert ended.out == ""
+    assert "The stop was not confirmed" in ended.err
 
 
-@pytest.mark.skipif(any(Path("/dev").glob("gpiochip*")), reason="This machine has pins.")
+@WITHOUT_PINS
 @pytest.mark.parametrize("command", ["serve", "safe-pins", "check --leds"])
-def test_a_machine_without_pins(run: Run, home: Path, command: str) -> None:
+def test_a_machine_without_pins(robot: Cli, home: Path, command: str) -> None:
     name, *options = command.split()
-    code, _, output = run(name, write_ready_profile(home), *options)
-    assert code == 2
-    assert "serve --twin" in output
-    assert output.count("\n") == 1
+    assert "serve --twin" in robot.refused(name, write_ready_profile(home), *options)
 
 
 def test_a_full_disk_leaves_no_partial_robot(
-    run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
+    robot: Cli, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No file is empty, and `init` can be run again."""
     real, left = os.fsync, 0
@@ -278,31 +244,28 @@ def test_a_full_disk_leaves_no_partial_robot(
     monkeypatch.setattr("os.fsync", fsync)
     for first in (0, 1, 2, 3, 1):  # Complete files are kept.
         left = first
-        code, _, output = run("init", "car", "--name", "rover")
-        assert code == 2
-        assert "No space left" in output
+        assert "No space left" in robot.refused("init", "car", "--name", "rover")
         assert not (home / "work" / "rover.toml").exists()
         assert all(path.stat().st_size for path in home.rglob("*") if path.is_file())
         assert not list(home.rglob(".*"))
     left = 99
-    assert run("init", "car", "--name", "rover")[0] == 0
+    robot.output("init", "car", "--name", "rover")
 
 
 def test_a_broken_file_of_a_known_robot_is_skipped(
-    run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
+    robot: Cli, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = FoundRobot("rover", "car", Address("192.0.2.1", 5000), "ab" * 32, "1")
     monkeypatch.setattr("shapechanger.cli.robot.remote.find", lambda _: [found])
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
-    assert run("remember", "mine", "192.0.2.1", "--fingerprint", "ab" * 32)[0] == 0
+    robot.output("remember", "mine", "192.0.2.1", "--fingerprint", "ab" * 32)
     broken = home / "config" / "shapechanger" / "known" / "broken.toml"
     broken.write_text("key = ")
     broken.chmod(0o600)
-    code, output, warned = run("find")
-    assert code == 0
-    assert "mine" in output
-    assert warned.startswith("broken is skipped: ")
-    assert warned.count("\n") == 1
+    ended = robot.ended(0, "find")
+    assert "mine" in ended.out
+    assert ended.err.startswith("broken is skipped: ")
+    assert ended.err.count("\n") == 1
 
 
 def test_questions_are_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
