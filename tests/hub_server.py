@@ -64,7 +64,6 @@ class FakeHub(ThreadingHTTPServer):
         self.stalled: set[str] = set()
         self.stalling = threading.Event()
         self.released = threading.Event()
-        self.blobs: dict[str, bytes] = {}
 
     @property
     def address(self) -> str:
@@ -99,7 +98,7 @@ class _Handler(BaseHTTPRequestHandler):
                 return
         self._send(501, {"error": f"The fake has no {self.command} {path}."})
 
-    do_HEAD = do_GET = do_POST = do_PUT = _answer
+    do_HEAD = do_GET = do_POST = _answer
 
     def _send(self, code: int, answer: Any, **headers: str) -> None:
         body = json.dumps(answer).encode()
@@ -174,30 +173,9 @@ class _Handler(BaseHTTPRequestHandler):
     def _preupload(self, name: str) -> None:
         if not self._may_write() or self._repository(name) is None:
             return
-        files = [
-            {
-                "path": (path := file["path"]),
-                "uploadMode": "lfs" if path.endswith((".jsonl", ".safetensors")) else "regular",
-                "shouldIgnore": False,
-                "oid": None,
-            }
-            for file in json.loads(self._body)["files"]
-        ]
-        self._send(200, {"files": files})
-
-    def _batch(self) -> None:
-        if not self._may_write():
-            return
-        objects = [
-            {**one, "actions": {"upload": {"href": f"{self.server.address}/lfs/{one['oid']}"}}}
-            for one in json.loads(self._body)["objects"]
-        ]
-        self._send(200, {"transfer": "basic", "objects": objects})
-
-    def _put(self, oid: str) -> None:
-        assert hashlib.sha256(self._body).hexdigest() == oid
-        self.server.blobs[oid] = self._body
-        self._send(200, {})
+        about = {"uploadMode": "regular", "shouldIgnore": False, "oid": None}
+        files = json.loads(self._body)["files"]
+        self._send(200, {"files": [about | {"path": file["path"]} for file in files]})
 
     def _commit(self, name: str) -> None:
         if not self._may_write() or (found := self._repository(name)) is None:
@@ -209,8 +187,6 @@ class _Handler(BaseHTTPRequestHandler):
             match plain["key"]:
                 case "file":
                     files[value["path"]] = base64.b64decode(value["content"])
-                case "lfsFile":
-                    files[value["path"]] = self.server.blobs[value["oid"]]
                 case "deletedFile":
                     del files[value["path"]]
                 case _:
@@ -252,7 +228,5 @@ _ROUTES = (
     (rf"GET /api/{_REPOSITORY}/tree/(\w+)", "_tree"),
     (rf"POST /api/{_REPOSITORY}/preupload/main", "_preupload"),
     (rf"POST /api/{_REPOSITORY}/commit/main", "_commit"),
-    (r"POST /(?:datasets/)?[\w.-]+/[\w.-]+\.git/info/lfs/objects/batch", "_batch"),
-    (r"PUT /lfs/(\w+)", "_put"),
     (r"(?:GET|HEAD) /(datasets/)?([\w.-]+/[\w.-]+)/resolve/([^/]+)/(.+)", "_file"),
 )

@@ -106,13 +106,9 @@ def test_no_program_is_started_from_the_command_line_package() -> None:
     assert found == []
 
 
-def test_every_folder_is_a_package() -> None:
-    """Every folder has an `__init__.py`; others would escape these checks."""
+def test_folders_are_packages_and_no_module_is_called_utils() -> None:
+    """Folders without an `__init__.py` would escape these checks."""
     folders = {path.parent for path in _MODULES.values()}
     assert [folder for folder in folders if not (folder / "__init__.py").exists()] == []
-
-
-def test_nothing_is_called_utils() -> None:
-    """No module has a name without meaning, such as `utils`."""
     names = {part for module in _MODULES for part in module.split(".")}
     assert not names & {"common", "helpers", "misc", "util", "utils"}

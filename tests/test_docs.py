@@ -38,17 +38,12 @@ def test_examples_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.sources
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_links_to_files_exist(page: Path) -> None:
-    """Relative links lead to files of the project."""
+def test_links_and_blocks(page: Path) -> None:
+    """Links lead to files of the project; blocks inside lists have four spaces, as MkDocs needs."""
     text = re.sub(r"<!-- .*? -->", "", page.read_text(), flags=re.DOTALL)  # For the site alone.
     for target in re.findall(r"\]\((?!http)([^)#]+)\)", text):
         assert (page.parent / target).exists(), target
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_blocks_in_lists_are_indented_by_four(page: Path) -> None:
-    """Blocks inside list items have four spaces; fewer do for code hosts, but not for MkDocs."""
-    fences = re.findall(r"^( +)```", page.read_text(), re.MULTILINE)
+    fences = re.findall(r"^( +)```", text, re.MULTILINE)
     assert {len(spaces) % 4 for spaces in fences} <= {0}
 
 

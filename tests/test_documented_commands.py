@@ -41,23 +41,16 @@ _OURS: Final = re.compile(r"(?:^|[\s/;&|])shapechanger (?=[a-z])")
 _NO_COMMANDS: Final = {"shapechanger link 1"}  # A text of the link's proof.
 
 
-def shell_commands(page: Path) -> list[str]:
+def _blocks(page: Path) -> list[str]:
     """Return the commands `shapechanger ...` of a page's blocks."""
     text = page.read_text()
     blocks = [body for _, language, body in _FENCE.findall(text) if language not in _PYTHON]
     outside = _FENCE.sub("", text).splitlines()
     # Blocks that are indented instead of fenced, and the comments of scripts.
-    lines = [line for line in outside if line.startswith(("    ", "#")) and "`" not in line]
-    return [command for part in (*blocks, *lines) for command in _commands_in(part)]
-
-
-def _commands_in(block: str) -> list[str]:
-    joined = block.replace("\\\n", " ")
-    return [
-        re.split(r" (?:&&|\||;|>) ", line[match.end() :])[0]
-        for line in joined.splitlines()
-        for match in _OURS.finditer(line)
-    ]
+    blocks += [line for line in outside if line.startswith(("    ", "#")) and "`" not in line]
+    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    found = ((line, match) for line in lines for match in _OURS.finditer(line))
+    return [re.split(r" (?:&&|\||;|>) ", line[match.end() :])[0] for line, match in found]
 
 
 def spans(page: Path) -> list[str]:
@@ -100,25 +93,15 @@ def refusal(words: list[str]) -> str:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_shell_commands_parse(page: Path) -> None:
-    """Each `shapechanger ...` of a block is a complete command with options that exist."""
-    wrong: dict[str, str] = {}
-    for command in shell_commands(page):
-        words = shlex.split(command.replace("…", "X"), comments=True)
-        if why := refusal(words):
-            wrong[command] = why
-    assert wrong == {}
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_inline_commands_parse(page: Path) -> None:
-    """Each inline command exists, with its options; it may leave out the rest."""
-    wrong: list[str] = []
-    for span in spans(page):
-        readings = [] if span in _NO_COMMANDS else list(_readings(span))
-        if readings and not any(map(_exists, readings)):
-            wrong.append(span)
-    assert wrong == []
+def test_commands_of_a_page_exist(page: Path) -> None:
+    """A command of a block is complete; one of inline code exists, with the options it names."""
+    commands = {one: shlex.split(one.replace("…", "X"), comments=True) for one in _blocks(page)}
+    assert {one: why for one, words in commands.items() if (why := refusal(words))} == {}
+    inline = {span: [*_readings(span)] for span in spans(page) if span not in _NO_COMMANDS}
+    assert [span for span, ways in inline.items() if ways and not any(map(_exists, ways))] == []
+    known = {name for kind in leaves().values() for name in options_of(kind)}
+    named = {re.split(r"[ =.]", span)[0] for span in spans(page) if span.startswith("--")}
+    assert named - known - FOREIGN - {"--help"} == set()
 
 
 def _exists(words: list[str]) -> bool:
@@ -138,46 +121,31 @@ def _readings(span: str) -> Iterator[list[str]]:
         words = shlex.split(span)
     except ValueError:
         return
-    if not words:
-        return
-    if words[0] == "shapechanger" and len(words) > 1:
+    if len(words) > 1 and words[0] == "shapechanger":
         yield words[1:]
-        return
-    tops = {path[0] for path in leaves()}
-    if words[0] in tops and len(words) > 1:
+    elif len(words) > 1 and words[0] in {path[0] for path in leaves()}:
         yield words
     elif any(word.startswith("--") for word in words[1:]):
         yield from ([*path[:-1], *words] for path in leaves() if path[-1] == words[0])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_inline_options_exist(page: Path) -> None:
-    """Each option that a page names by itself is one of a command."""
-    known = {name for kind in leaves().values() for name in options_of(kind)}
-    named = {re.split(r"[ =.]", span)[0] for span in spans(page) if span.startswith("--")}
-    assert named - known - FOREIGN - {"--help"} == set()
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_other_commands_exist(page: Path) -> None:
     """Targets of make, rows of the benchmarks, scripts and modules exist."""
-    text = page.read_text()
-    code = [*(body for _, _, body in _FENCE.findall(text)), *spans(page)]
-    makefile = (ROOT / "Makefile").read_text()
-    for part in code:
-        for target in re.findall(r"^make(?: [A-Z]+=\S+)* ([a-z-]+)", part, re.MULTILINE):
-            assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
-        for rows in re.findall(r"python -m benchmarks\.run((?: [a-z-]+)*)", part):
-            assert set(rows.split()) <= set(SUITES), rows
-        for script in re.findall(r"python (\S+\.py)", part):
-            assert (ROOT / script).exists() or page.suffix == ".py", script
-        for module in re.findall(r"python -m (shapechanger[\w.]*)", part):
-            assert importlib.util.find_spec(module), module
+    code = "\n".join([*(body for _, _, body in _FENCE.findall(page.read_text())), *spans(page)])
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert {*re.findall(r"^make(?: [A-Z]+=\S+)* ([a-z-]+)", code, re.MULTILINE)} <= {*targets}
+    rows = " ".join(re.findall(r"python -m benchmarks\.run((?: [a-z-]+)*)", code))
+    assert {*rows.split()} <= {*SUITES}
+    scripts = re.findall(r"python (\S+\.py)", code) if page.suffix != ".py" else []
+    assert [script for script in scripts if not (ROOT / script).exists()] == []
+    modules = re.findall(r"python -m (shapechanger[\w.]*)", code)
+    assert [module for module in modules if not importlib.util.find_spec(module)] == []
 
 
 def test_a_wrong_command_is_found() -> None:
     """A command, an option and a value that do not exist are refused; commands are found."""
-    assert len(shell_commands(ROOT / "docs" / "studies.md")) > 10
+    assert len(_blocks(ROOT / "docs" / "studies.md")) > 10
     assert len([span for span in spans(ROOT / "docs" / "build.md") if [*_readings(span)]]) > 10
     assert refusal(["suite", "run", "ants"]) == ""
     assert "no-such" in refusal(["suite", "no-such"])

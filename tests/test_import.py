@@ -8,44 +8,28 @@ import sys
 import pytest
 
 import shapechanger
-from shapechanger.envs.catalogue import (
-    FINGER_ENVS,
-    ODRL_ENVS,
-    OWN_ROBOT,
-    REMOTE_FINGER,
-    REMOTE_FINGER_TRACK,
-    REMOTE_VEHICLE,
-    REMOTE_WAYPOINT,
-    VEHICLE_ENVS,
-)
+from shapechanger.envs.catalogue import FINGER_ENVS, ODRL_ENVS, VEHICLE_ENVS
 
-_IDS = (
-    "shapechanger/InvertedPendulum-v1",
-    "shapechanger/SmallInvertedPendulum-v1",
-    "shapechanger/BigInvertedPendulum-v1",
-    "shapechanger/Ant-v1",
-    "shapechanger/AmputatedAnt-v1",
-    "shapechanger/BigAnt-v1",
-    "shapechanger/ExtendedAnt-v1",
-    "shapechanger/HalfCheetah-v1",
-    "shapechanger/Hopper-v1",
-    "shapechanger/Walker2d-v1",
-    "shapechanger/Swimmer-v1",
-    "shapechanger/Humanoid-v1",
-    "shapechanger/InvertedDoublePendulum-v1",
-)
-_VEHICLES = (
-    "shapechanger/Car-v1",
-    "shapechanger/Tank-v1",
-    "shapechanger/Truck-v1",
-    "shapechanger/Boat-v1",
-)
-# Variants with distances and with waypoints.
-_MORE_VEHICLES = tuple(
-    name.replace("-v1", f"{kind}-v1") for kind in ("Ranges", "Waypoint") for name in _VEHICLES
-)
 
-_FINGERS = ("shapechanger/Finger-v1", "shapechanger/FingerTrack-v1")
+def _ids(*names: str) -> tuple[str, ...]:
+    return tuple(f"shapechanger/{name}-v1" for name in names)
+
+
+_IDS = _ids(
+    *("InvertedPendulum", "SmallInvertedPendulum", "BigInvertedPendulum", "Ant", "AmputatedAnt"),
+    *("BigAnt", "ExtendedAnt", "HalfCheetah", "Hopper", "Walker2d", "Swimmer", "Humanoid"),
+    "InvertedDoublePendulum",
+)
+_VEHICLES = _ids("Car", "Tank", "Truck", "Boat")
+_MORE_VEHICLES = _ids(
+    *(
+        f"{name}{kind}"
+        for kind in ("Ranges", "Waypoint")
+        for name in ("Car", "Tank", "Truck", "Boat")
+    )
+)
+_FINGERS = _ids("Finger", "FingerTrack")
+_REMOTE = _ids("RemoteFinger", "RemoteFingerTrack", "RemoteVehicle", "RemoteWaypoint")
 
 # Imports of a blocked package fail, as if it were not installed.
 _BLOCK = """
@@ -88,9 +72,8 @@ def test_import_registers_ids_without_a_simulator() -> None:
     )
     loaded, ids = _run(script).splitlines()
     assert loaded == ""
-    vehicles = (*_VEHICLES, *_MORE_VEHICLES)
-    remote = (REMOTE_FINGER, REMOTE_FINGER_TRACK, REMOTE_VEHICLE, REMOTE_WAYPOINT)
-    assert tuple(ids.split()) == (*_IDS, *ODRL_ENVS, OWN_ROBOT, *vehicles, *_FINGERS, *remote)
+    own = (*_ids("OwnRobot"), *_VEHICLES, *_MORE_VEHICLES, *_FINGERS, *_REMOTE)
+    assert tuple(ids.split()) == (*_IDS, *ODRL_ENVS, *own)
     assert (tuple(VEHICLE_ENVS), tuple(FINGER_ENVS)) == (_VEHICLES, _FINGERS)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import importlib
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,34 +20,21 @@ def _project(folder: Path) -> dict[str, Any]:
     return tomllib.loads((folder / "pyproject.toml").read_text())["project"]
 
 
-def _imports_of_ours(file: Path) -> Iterator[tuple[str, str]]:
-    """Yield module and name of each import from `shapechanger`."""
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "shapechanger":
-            yield from ((node.module or "", alias.name) for alias in node.names)
-
-
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_what_the_package_imports_from_here_exists(file: Path) -> None:
-    """A name that is renamed here is renamed there too."""
-    for module, name in _imports_of_ours(file):
-        found = importlib.import_module(module)
-        if not hasattr(found, name):
-            importlib.import_module(f"{module}.{name}")
+def test_imported_names_exist(file: Path) -> None:
+    """A name that is renamed here is renamed there too.
 
-
-@pytest.mark.parametrize(
-    "file", sorted(LEROBOT.glob("tests/test_*.py")), ids=lambda file: file.stem
-)
-def test_shared_test_modules_exist(file: Path) -> None:
-    """The package's tests import from `tests` here without that name, because draccus takes it."""
+    The package's tests import from `tests` here without that name, because draccus takes it.
+    """
     for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("robot."):
-            assert (
-                (ROOT / "tests" / (node.module or "").replace(".", "/"))
-                .with_suffix(".py")
-                .is_file()
-            )
+        module = (isinstance(node, ast.ImportFrom) and node.module) or ""
+        if module.split(".")[0] == "shapechanger":
+            found = importlib.import_module(module)
+            for alias in node.names:
+                if not hasattr(found, alias.name):
+                    importlib.import_module(f"{module}.{alias.name}")
+        elif module.startswith("robot."):
+            assert (ROOT / "tests" / f"{module.replace('.', '/')}.py").is_file()
 
 
 def test_lerobot_finds_the_package() -> None:

@@ -67,18 +67,6 @@ HEADERS: dict[str, Callable[[Header], object]] = {
 }
 
 
-@pytest.mark.parametrize("name", HEADERS)
-def test_a_forged_header_is_refused(path: Path, name: str) -> None:
-    """In one line without control characters."""
-    content = path.read_bytes()
-    length = int.from_bytes(content[:8], "little")
-    header = json.loads(content[8 : 8 + length])
-    HEADERS[name](header)
-    text = json.dumps(header).encode()
-    path.write_bytes(len(text).to_bytes(8, "little") + text + content[8 + length :])
-    _refused(path)
-
-
 def _refused(path: Path) -> str:
     with pytest.raises(PolicyError, match="is not a policy that") as refusal:
         load_policy(path)
@@ -108,21 +96,27 @@ FILES: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", [*HEADERS, *FILES])
 def test_a_damaged_file_is_refused(path: Path, name: str) -> None:
-    path.write_bytes(FILES[name](path.read_bytes()))
+    content = path.read_bytes()
+    path.write_bytes(FILES[name](content) if name in FILES else _forged(content, HEADERS[name]))
     _refused(path)
 
 
-def test_a_large_file_is_not_read(path: Path) -> None:
-    """The file claims 8 GiB, and has no bytes on the disk."""
+def _forged(content: bytes, change: Callable[[Header], object]) -> bytes:
+    """Return a file with another header."""
+    length = int.from_bytes(content[:8], "little")
+    header = json.loads(content[8 : 8 + length])
+    change(header)
+    text = json.dumps(header).encode()
+    return len(text).to_bytes(8, "little") + text + content[8 + length :]
+
+
+def test_what_is_too_large_or_never_ends_is_not_read(path: Path) -> None:
+    """A file that claims 8 GiB, a pipe that nobody writes to, and a device."""
     with path.open("wb") as file:
         file.truncate(8 * _GIB)
     assert "larger than 256 MiB" in _refused(path)
-
-
-def test_what_never_ends_is_not_read(path: Path) -> None:
-    """A pipe that nobody writes to, and a device."""
     path.unlink()
     os.mkfifo(path)
     assert "not a file" in _refused(path)

@@ -67,7 +67,6 @@ def environment(served: FakeHub, tmp_path_factory: pytest.TempPathFactory) -> di
         "HF_ENDPOINT": served.address,
         "HF_HOME": str(tmp_path_factory.mktemp("home")),
         "HF_TOKEN": OWNER,
-        # The fake stores large files as Git LFS does.
         "HF_HUB_DISABLE_XET": "1",
         "NO_PROXY": "127.0.0.1",
     }
@@ -183,63 +182,53 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def listing(files: dict[str, tuple[int, str]], kind: str = "policy") -> bytes:
-    """Return a `shapechanger.json`."""
-    about = {name: {"bytes": size, "sha256": digest} for name, (size, digest) in files.items()}
+def listing(files: dict[str, bytes], kind: str = "policy") -> bytes:
+    """Return a `shapechanger.json` with the right sizes and hashes."""
+    about = {
+        name: {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+        for name, content in files.items()
+    }
     return json.dumps({"format": 1, "kind": kind, "files": about}).encode()
 
 
-NAME = "policy.safetensors"
-ZERO = "0" * 64
+def episodes(*names: str) -> dict[str, bytes]:
+    return {f"episodes/{name}": b"x" for name in names}
+
+
+DEMOS = "demonstrations"
+ABC = {"policy.safetensors": b"abc"}
+STEPS, EVIL = episodes("one/steps.jsonl"), episodes("../../evil")
 
 
 @pytest.mark.parametrize(
-    ("content", "listed", "message"),
+    ("command", "held", "listed", "message"),
     [
-        (b"abc", listing({NAME: (2, ZERO)}), "does not have the SHA-256"),
-        (b"abc", listing({"model.pkl": (3, ZERO)}), "names 'model.pkl', which is no policy file"),
-        (b"abc", listing({NAME: (3, ZERO)}, "demonstrations"), "does not list files of policy"),
-        (b"abc", b'{"format": 2}', "does not list files of policy in format 1"),
-        (b"abc", b"[" * 10**6, "does not list files of policy"),
-        (
-            b"abc",
-            listing({
-                NAME: (3, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad")
-            }),
-            "policy.safetensors of ada/x is not a policy",
-        ),
-    ],
-)  # fmt: skip
-def test_files_that_are_refused(
-    run: Run, hub: FakeHub, tmp_path: Path, content: bytes, listed: bytes, message: str
-) -> None:
-    """Sizes, hashes, names and kinds are checked; nothing is left behind."""
-    hub.repositories["models/ada/x"] = Repository()
-    hub.repositories["models/ada/x"].commit({NAME: content, "shapechanger.json": listed})
-    before = sorted(tmp_path.iterdir())
-    assert message in refused(run("policies", "pull", "ada/x", "--out", tmp_path / "out"))
-    assert sorted(tmp_path.iterdir()) == before
-
-
-@pytest.mark.parametrize(
-    ("files", "listed", "message"),
-    [
-        (["../../evil"], ["../../evil"], "'episodes/../../evil', which is no demonstrations file"),
-        (["one/steps.jsonl", "one/evil.pkl"], ["one/steps.jsonl"], "'episodes/one/evil.pkl'"),
-        (["one/steps.jsonl"], ["one/steps.jsonl"], "is not an episode"),
-        ([], ["one/steps.jsonl"], "has other files than its shapechanger.json names"),
+        ("policies", ABC, listing({"policy.safetensors": b"xy"}), "does not have the SHA-256"),
+        ("policies", ABC, listing({"model.pkl": b"abc"}), "'model.pkl', which is no policy file"),
+        ("policies", ABC, listing(ABC, DEMOS), "does not list files of policy"),
+        ("policies", ABC, b'{"format": 2}', "does not list files of policy in format 1"),
+        ("policies", ABC, b"[" * 10**6, "does not list files of policy"),
+        ("policies", ABC, listing(ABC), "policy.safetensors of ada/x is not a policy"),
+        ("demos", EVIL, listing(EVIL, DEMOS), "evil', which is no demonstrations file"),
+        ("demos", STEPS | episodes("one/x.pkl"), listing(STEPS, DEMOS), "'episodes/one/x.pkl'"),
+        ("demos", STEPS, listing(STEPS, DEMOS), "is not an episode"),
+        ("demos", {}, listing(STEPS, DEMOS), "has other files than its shapechanger.json names"),
     ],
 )
-def test_episodes_that_are_refused(
-    run: Run, hub: FakeHub, tmp_path: Path, files: list[str], listed: list[str], message: str
+def test_files_that_are_refused(
+    run: Run,
+    hub: FakeHub,
+    tmp_path: Path,
+    command: str,
+    held: dict[str, bytes],
+    listed: bytes,
+    message: str,
 ) -> None:
-    """A repository holds the files of episodes that it lists, and nothing else."""
-    digest = 1, hashlib.sha256(b"x").hexdigest()
-    about = listing({f"episodes/{name}": digest for name in listed}, "demonstrations")
-    repository = hub.repositories["datasets/ada/x"] = Repository()
-    held = {f"episodes/{name}": b"x" for name in files}
-    repository.commit({**held, "shapechanger.json": about})
-    assert message in refused(run("demos", "pull", "ada/x", "--out", tmp_path / "out"))
+    """Sizes, hashes, names and kinds are checked; nothing is left behind."""
+    kind = "models" if command == "policies" else "datasets"
+    repository = hub.repositories[f"{kind}/ada/x"] = Repository()
+    repository.commit({**held, "shapechanger.json": listed})
+    assert message in refused(run(command, "pull", "ada/x", "--out", tmp_path / "out"))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -3,16 +3,37 @@
 from __future__ import annotations
 
 import html
+import json
 import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+import simplejpeg
 
-from shapechanger.demos.episodes import EpisodeWriter, read_episode
+from shapechanger.cli import main
+from shapechanger.cli.demos.recordings import DemosExport, DemosImport
+from shapechanger.cli.demos.train import DemosEvaluate, DemosTrain
+from shapechanger.demos.cloning.network import CameraPolicy
+from shapechanger.demos.dataset import load_dataset
+from shapechanger.demos.episodes import (
+    Drop,
+    EpisodeHeader,
+    EpisodeWriter,
+    Step,
+    edit,
+    episodes_of,
+    read_episode,
+)
+from shapechanger.errors import DemosError, OutputError, PolicyError
+from shapechanger.policy import load_policy
+from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.cli.demos.pictures import grey
 from tests.cli.running import Cli
+from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
 from tests.demos.episodes.making import header, step
+from tests.demos.exchange.small import drive, keys_folder, tub_folder
 
 
 @pytest.fixture
@@ -151,3 +172,260 @@ def test_an_env_with_other_actions_is_refused(data: Path, demos: Cli) -> None:
     sentence = demos.refused("replay", first, "--env", "Ant")
     assert "hip_1/motor" in sentence
     assert "was recorded with steering, throttle" in sentence
+
+
+SHORT = ("--minutes", "0.05", "--episode-s", "2", "--options", '{"size": [64, 48]}')
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.gl
+def test_an_experts_recording_replays_identically(tmp_path: Path, demos: Cli) -> None:
+    """State and images are equal in every step; each episode has its seed."""
+    data = tmp_path / "data"
+    printed = demos.output("record", "Car", "--out", data, "--seed", 7, *SHORT)
+    assert "wrote 60 steps" in printed
+    first, second = (read_episode(path) for path in episodes_of(data))
+    assert (len(first.steps), len(second.steps)) == (40, 20)
+    assert (first.outcome, second.outcome) == ("time", "")
+    assert (first.header.seed, second.header.seed) == (7, 8)
+    assert first.header.env == "shapechanger/Car-v1"
+    assert first.header.body == "car"
+    assert (first.header.camera_pitch_deg, first.header.camera_fovy_deg) == (0.0, 48.8)
+    assert first.header.image_size == (64, 48)
+    assert {step.driver for step in first.steps} == {"expert"}
+    assert any(step.action != step.applied for step in first.steps)
+    assert load_dataset(data).pictures is not None
+    printed = demos.output("replay", first.path, "--env", "Car")
+    assert "played 40 of 40 steps" in printed
+    assert "the state is the same in every step" in printed
+    assert "the images are the same in every step" in printed
+    printed = demos.output("replay", first.path, "--env", "Tank")
+    assert "when recorded" in printed
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.gl
+def test_a_policy_is_corrected(tmp_path: Path, demos: Cli) -> None:
+    """Only the expert's steps are loaded for learning."""
+    data = tmp_path / "data"
+    policy = ("--driver", str(CLONES["boat"]), "--corrected-by", "expert")
+    printed = demos.output("record", "Car", "--out", data, "--minutes", "0.1", *policy)
+    (path,) = episodes_of(data)
+    episode = read_episode(path)
+    drivers = [step.driver for step in episode.steps]
+    assert set(drivers) == {"policy", "expert"}
+    corrected = [step for step in episode.steps if step.driver == "expert"]
+    assert all(step.wanted is not None for step in corrected)
+    assert all(step.wanted is None for step in episode.steps if step.driver == "policy")
+    assert "the expert takes over" in episode.marks[0].text
+    assert len(load_dataset(data)) == len(corrected)
+    assert f" of the steps, {len(corrected)} of 120, and took over " in printed
+    assert episode.header.notes["corrected_by"] == "expert"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["Ant"], "has no expert"),
+        (["Car", "--minutes", "0"], "--minutes is more than 0"),
+        (["Car", "--driver", "expret"], "no driver 'expret'"),
+        (["Car", "--corrected-by", "expert"], "needs no correction"),
+        (["Car", "--corrected-by", "me"], "corrected by expert"),
+        (["Car", "--options", '{"colour": 3}'], "colour"),
+        (["Car", "--seed", "-1"], "A seed is"),
+        (["Ant", "--put-back"], "are for vehicles"),
+    ],
+)
+def test_invalid_arguments_give_one_sentence(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    demos: Cli,
+    gl: None,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert words in demos.refused("record", *arguments, "--out", "data")
+    assert not Path("data").exists()
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.gl
+def test_ctrl_c_leaves_whole_episodes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, demos: Cli, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from shapechanger.vehicles.envs.demonstrators import Demonstrator
+
+    acts = Demonstrator.act
+    calls = iter(range(100))
+
+    def interrupted(self: Demonstrator) -> object:
+        if next(calls) == 10:
+            raise KeyboardInterrupt
+        return acts(self)
+
+    monkeypatch.setattr(Demonstrator, "act", interrupted)
+    with pytest.raises(SystemExit) as stop:
+        main(["demos", "record", "Car", "--out", str(tmp_path / "data"), *SHORT])
+    assert stop.value.code == 130
+    assert "is in" in capsys.readouterr().err
+    (path,) = episodes_of(tmp_path / "data")
+    episode = read_episode(path)
+    assert (len(episode.steps), episode.closed, episode.outcome) == (10, True, "stopped")
+
+
+def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    DemosImport(keys_folder(tmp_path / "keys"), tmp_path / "data").run()
+    assert capsys.readouterr().out == (
+        f"read {tmp_path / 'keys'} (csv): 1 episode, 3 steps, 3 images\nwrote {tmp_path / 'data'}\n"
+    )
+
+
+def test_a_partial_import_has_an_exit_code_of_its_own(
+    tmp_path: Path, demos: Cli, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """0 for all, 3 for a part, 2 for nothing; findings are on the standard error."""
+    records = [
+        {"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 51 * n, "lap": 1}
+        for n in range(30)
+    ]
+    tub = tub_folder(tmp_path / "tub", records)
+    for n in (3, 5, 8, 9):
+        (tub / f"images/{n}_cam_image_array_.jpg").write_bytes(b"")
+    command = ["demos", "import", str(tub), "--out", str(tmp_path / "data")]
+    sentence = demos.refused(*command[1:], "--strict")
+    left_out = "left out: 4 records with an empty image: 3, 5, 8, and 1 more"
+    assert f"is incomplete ({left_out})" in sentence
+    assert not (tmp_path / "data").exists()
+    with pytest.raises(SystemExit) as ended:
+        main(command)
+    assert ended.value.code == 3
+    output = capsys.readouterr()
+    assert "1 episode, 26 steps, 26 images" in output.out
+    assert "note: Columns that are not imported: lap.\n" in output.out
+    assert "which is taken to be 20 Hz; --hz states another rate.\n" in output.out
+    assert output.err == "left out 4 records with an empty image: 3, 5, 8, and 1 more\n"
+    with pytest.raises(SystemExit) as ended:
+        main(["demos", "import", str(tub), "--out", str(tmp_path / "b"), "--hz", "10"])
+    assert ended.value.code == 3
+    assert "these times are left out" in capsys.readouterr().out
+
+
+def test_export_prints_a_summary_and_how_to_load(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Dropped steps are counted, and the Minari path is given."""
+    path = drive(tmp_path / "data")
+    edit(path, Drop(1, 2, "bad"))
+    DemosExport(tmp_path / "data", tmp_path / "sets/drive-v0", "minari").run()
+    output = capsys.readouterr().out
+    assert "3 steps of 2 episodes\n" in output
+    assert "so episodes are split at 1 gap of excluded or missing steps" in output
+    assert "left out 2 dropped steps; --dropped includes them" in output
+    assert f"MINARI_DATASETS_PATH={tmp_path / 'sets'}" in output
+    assert "minari.load_dataset('drive-v0')" in output
+    DemosExport(tmp_path / "data", tmp_path / "csv", "csv", dropped=True).run()
+    assert "5 steps of 1 episode\n" in capsys.readouterr().out
+
+
+def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """How to load a LeRobot dataset is printed, and what takes dropped steps."""
+    edit(drive(tmp_path / "data"), Drop(0, 0, "bad"))
+    DemosExport(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
+    output = capsys.readouterr().out
+    assert "4 steps of 1 episode\nleft out 1 dropped step\n" in output
+    assert f"LeRobotDataset('set', root='{tmp_path / 'set'}')" in output
+    DemosImport(tmp_path / "set", tmp_path / "back", camera="camera").run()
+    assert "(lerobot): 1 episode, 4 steps, 4 images" in capsys.readouterr().out
+    DemosExport(tmp_path / "data", tmp_path / "logs", "mcap").run()
+    assert "left out 1 dropped step; --dropped includes them" in capsys.readouterr().out
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings that train in seconds."""
+    monkeypatch.setattr("shapechanger.demos.cloning.clone.DEMOS", QUICK)
+
+
+def _record(folder: Path, n: int, seed: int, layout: object = KEYS) -> Path:
+    """Record an episode as a person would drive it."""
+    chosen = STEERS if layout is STEERS else KEYS
+    data = stripes(n, seed, chosen)
+    header = EpisodeHeader(action_layout=chosen.to_json(), image_size=(50, 33), clock="none")
+    assert data.pictures is not None
+    with EpisodeWriter.create(folder, header) as writer:
+        for picture, action in zip(data.pictures, data.actions, strict=True):
+            jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(picture), quality=95)
+            writer.add(Step(action=tuple(map(float, action)), driver="person"), jpeg)
+        writer.close()
+    return folder
+
+
+def test_a_recording_becomes_a_policy_with_a_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`train` writes policy, report and exports; `evaluate` prints the accuracy last."""
+    data = _record(tmp_path / "drive", 150, 0)
+    out = tmp_path / "made" / "policy.safetensors"
+    DemosTrain(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
+    made = sorted(path.name for path in out.parent.iterdir())
+    assert made == ["policy.html", "policy.json", "policy.safetensors", "ppo.zip"]
+    page = out.with_suffix(".html").read_text()
+    assert page.count("data:image/png;base64,") == 12
+    assert "http" not in page.replace("http://www.w3.org", "")
+    report = json.loads(out.with_suffix(".json").read_text())
+    assert report["evaluation"]["steps"] == 30
+    assert "from 0.1 minutes" in report["outlook"]  # 120 of 150 steps at 20 Hz.
+    printed = " ".join(capsys.readouterr().out.split())
+    assert report["outlook"] in printed
+    assert report["outlook"] in " ".join(html.unescape(page).split())
+    assert load_policy(out).card.steps == 120
+    capsys.readouterr()
+    DemosEvaluate(out, data).run()
+    lines = capsys.readouterr().out.splitlines()
+    assert "learned from the first 120 of these 150 steps" in " ".join(lines)
+    capsys.readouterr()
+    DemosEvaluate(
+        out, _record(tmp_path / "other", 60, 1), report=tmp_path / "r" / "page.html"
+    ).run()
+    lines = capsys.readouterr().out.splitlines()
+    report = json.loads((tmp_path / "r" / "page.json").read_text())
+    assert lines[-1] == f"accuracy {report['evaluation']['accuracy']:.3f}"
+    assert report["evaluation"]["accuracy"] > 0.8
+
+
+def test_regression_prints_errors_and_accuracy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = _record(tmp_path / "drive", 90, 0, STEERS)
+    _record(data, 30, 1, STEERS)
+    out = tmp_path / "policy.safetensors"
+    DemosTrain(data, out, split="episode", sac=tmp_path / "sac.zip").run()
+    assert load_policy(out).card.steps == 90
+    text = capsys.readouterr().out
+    assert "steering: mean absolute error" in text
+    assert text.splitlines()[-1].startswith("accuracy ")
+    assert out.with_suffix(".html").exists()
+
+
+def test_invalid_arguments_are_refused_before_training(tmp_path: Path) -> None:
+    data = _record(tmp_path / "drive", 20, 0)
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(OutputError, match="it is a folder"):
+        DemosTrain(data, tmp_path / "taken").run()
+    with pytest.raises(OutputError, match="two files"):
+        DemosTrain(data, tmp_path / "p.safetensors", sac=tmp_path / "p.safetensors").run()
+    with pytest.raises(DemosError, match="one episode only"):
+        DemosTrain(data, tmp_path / "p.safetensors", split="episode").run()
+    with pytest.raises(DemosError):
+        DemosTrain(tmp_path / "nowhere", tmp_path / "p.safetensors").run()
+    with pytest.raises(PolicyError, match="no policy file"):
+        DemosEvaluate(tmp_path / "p.safetensors", data).run()
+    assert not (tmp_path / "p.safetensors").exists()
+
+
+def test_a_policy_for_another_layout_is_refused(tmp_path: Path) -> None:
+    policy = CameraPolicy.fresh(QUICK, 0)
+    policy.save(tmp_path / "p.safetensors")
+    with pytest.raises(PolicyError, match=r"policy are steering, throttle, but .* forward"):
+        DemosEvaluate(tmp_path / "p.safetensors", _record(tmp_path / "drive", 10, 0)).run()

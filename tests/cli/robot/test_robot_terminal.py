@@ -6,27 +6,32 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from shapechanger.cli import main
+from shapechanger.cli.robot.drive import recorded_to
+from shapechanger.demos.episodes import episodes_of, read_episode
+from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.env import RemoteVehicleEnv
-from shapechanger.robot.client.known_robots import remember
+from shapechanger.robot.client.known_robots import recall, remember
+from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
+from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.cli.robot.typing import Person
 from tests.robot.client.robot import eventually
-from tests.robots import IN_A_ROOM, PATIENT_CAR, changed, write_profile
+from tests.robots import BLIND_CAR, IN_A_ROOM, PATIENT_CAR, changed, write_profile
+from tests.served import driving
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
-SERVO = """\
-# A car with a servo to calibrate.
-
+CAR = """\
 [robot]
-name = "servo-car"
+name = "small-car"
 body = "car"
-
+"""
+SERVO = """
 [action.steering]
 gain = 1.0  # Not touched.
 
@@ -40,14 +45,7 @@ centre_us = 1500
 right_us = 1850
 mix = { steering = 1.0 }
 """
-
-MOTOR = """\
-# A car with a motor to calibrate.
-
-[robot]
-name = "motor-car"
-body = "car"
-
+MOTOR = """
 [action.throttle]
 propels = true
 
@@ -58,12 +56,7 @@ forward = 22  # Header place 15.
 backward = 27
 mix = { throttle = 0.8 }
 """
-
-ESC = """\
-[robot]
-name = "esc-car"
-body = "car"
-
+ESC = """
 [action.throttle]
 propels = true
 
@@ -198,7 +191,7 @@ def test_a_person_lets_a_waiting_program_drive(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="Needs the parent-death signal.")
 def test_killing_the_command_ends_its_robot(tmp_path: Path) -> None:
     """Closing the terminal must not leave an armed robot."""
-    profile = write_profile(tmp_path, MOTOR)
+    profile = write_profile(tmp_path, CAR + MOTOR)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path) as person:
         person.read_until("begins to move")
         # The supervisor, and below it guard and daemon.
@@ -230,14 +223,6 @@ def _calibrate(folder: Path, text: str, *steps: tuple[str, str], code: int = 0) 
         return person.text, profile.path.read_text()
 
 
-def _output(text: str, name: str) -> dict[str, Any]:
-    return tomllib.loads(text)["output"][name]
-
-
-def _with(first: str, second: str) -> str:
-    return f"{first}\n[action{second.partition('[action')[2]}"
-
-
 def test_calibrating_a_motor_and_a_servo(tmp_path: Path) -> None:
     """What was found is written, a reversed motor gets a negative mix, and other lines stay."""
     steps = (
@@ -247,8 +232,9 @@ def test_calibrating_a_motor_and_a_servo(tmp_path: Path) -> None:
         ("straight", "d\r"),
         ("full right", "d" * 20 + "\r"),
     )
-    _, text = _calibrate(tmp_path, _with(MOTOR, SERVO), *steps)
-    drive, steer = _output(text, "drive"), _output(text, "steer")
+    _, text = _calibrate(tmp_path, CAR + MOTOR + SERVO, *steps)
+    outputs = tomllib.loads(text)["output"]
+    drive, steer = outputs["drive"], outputs["steer"]
     assert drive["start"] == pytest.approx(4 * 0.05 * 0.8)
     assert drive["mix"] == {"throttle": -0.8}
     assert steer["left_us"] == pytest.approx(1500 - 0.5 * 900)
@@ -266,8 +252,8 @@ def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
         ("fastest forward", "d" * 40),
         ("Go beyond it?", "y" + "d" * 5 + "\r"),
     )
-    _, text = _calibrate(tmp_path, ESC, *steps)
-    drive = _output(text, "drive")
+    _, text = _calibrate(tmp_path, CAR + ESC, *steps)
+    drive = tomllib.loads(text)["output"]["drive"]
     assert drive["backward_us"] == pytest.approx(1500 - 0.4 * 900)
     assert drive["forward_us"] == pytest.approx(1500 + 0.5 * 900)
 
@@ -275,7 +261,7 @@ def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
 @pytest.mark.parametrize("key", ["q", " ", "\x1b"])
 def test_ending_writes_nothing_and_goes_no_further(tmp_path: Path, key: str) -> None:
     """Q, Space and Escape end the calibration and discard results; N skips one output."""
-    both = _with(SERVO, MOTOR)
+    both = CAR + SERVO + MOTOR
     steps = (("full left", "n"), ("begins to move", "dddd\r"), ("Y or N", key))
     said, text = _calibrate(tmp_path, both, *steps)
     assert (text, "nothing was written" in said) == (both, True)
@@ -286,9 +272,116 @@ def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
     steps = [("begins to move", "dddd"), ("duty 0.16", "\r"), ("Y or N", "y")]
     for place in ("full left", "straight", "full right"):
         steps += [(place, ""), ("1500 µs", "\r")]
-    said, text = _calibrate(tmp_path, _with(MOTOR, SERVO), *steps, code=2)
+    said, text = _calibrate(tmp_path, CAR + MOTOR + SERVO, *steps, code=2)
     assert "must lie between" in said
     assert "Results so far" in said
-    assert _output(text, "drive")["start"] == pytest.approx(4 * 0.05 * 0.8)
-    assert _output(text, "steer")["left_us"] == 1150
-    assert "calibrated" not in tomllib.loads(text)["robot"]
+    profile = tomllib.loads(text)
+    assert profile["output"]["drive"]["start"] == pytest.approx(4 * 0.05 * 0.8)
+    assert profile["output"]["steer"]["left_us"] == 1150
+    assert "calibrated" not in profile["robot"]
+
+
+def test_a_second_person_stops_a_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`robot stop` works while another client drives, and stays in force."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(write_profile(tmp_path, BLIND_CAR), arguments=IN_A_ROOM) as robot:
+        remember(replace(robot.known, name="car"))
+        with driving(robot, "real") as car:
+            car.drive_until(lambda seen: seen.action_applied[1] > 0.0, 0.0, 0.5)
+            main(["robot", "stop", "car", "--reason", "a dog"])
+            output = capsys.readouterr().out
+            assert output.startswith("car is stopped. ")
+            assert "a dog" in output
+            assert "shapechanger robot drive car" in output
+            seen = car.step(0.0, 0.5)
+            assert seen.emergency
+            assert seen.action_applied[1] == 0.0
+
+
+def test_a_name_is_that_of_a_robot_that_can_be_reached(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of any free port, the real one is stored; a robot that does not start keeps no name."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    profile = write_profile(tmp_path, BLIND_CAR)
+    serve = ("robot", "serve", str(profile.path), "--twin", "--no-announce", "--port", "0")
+    serve += (*IN_A_ROOM, "--twin-folder", str(tmp_path))
+    with Person(serve, tmp_path) as person:
+        person.read_until("Known here as blind-car: `shapechanger robot drive blind-car`")
+        known = recall("blind-car")
+        with RobotClient.connect(known, frames=False) as client:
+            assert client.welcome.robot == "blind-car"
+        with Person(serve, tmp_path) as second:
+            assert second.end() != 0, second.text
+        assert recall("blind-car") == known
+        person.process.terminate()
+        assert person.end() == 0
+
+
+@pytest.mark.gl
+def test_a_person_lets_a_policy_drive_and_corrects_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """P starts the policy, a direction key takes over, and both are recorded."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with run_robot(
+        write_profile(tmp_path, PATIENT_CAR), arguments=("--world", "corridor")
+    ) as robot:
+        remember(replace(robot.known, name="car"))
+        data = tmp_path / "data"
+        command = ("robot", "drive", "car", "--policy", str(CLONES["car"]), "--record", str(data))
+        with Person(command, tmp_path) as person:
+            read = person.read_until("not armed")
+            # The policy does not start by itself.
+            read = person.read_until("recording", read)
+            person.press("p")
+            read = person.read_until("it drives", read)
+            read = person.read_until("commanded by car", read)
+            with robot.client(role="person", frames=False) as watcher:
+                person.wait_for(lambda: watcher.ask().message.action_applied[1] != 0.0)
+                person.press("w")
+                person.wait_for(lambda: watcher.ask().message.holder_role == "person")
+                for _ in range(5):
+                    person.press("w")
+                    person.wait_for(lambda: _is_corrected(watcher.ask().message))
+            person.press("q")
+            assert person.end() == 0
+        (path,) = episodes_of(data)
+        steps = read_episode(path).kept
+        assert {step.driver for step in steps} == {"person", "program"}
+        corrections = [step for step in steps if step.driver == "person" and step.wanted]
+        assert corrections
+        assert all(read_episode(path).jpeg(step) for step in steps)
+
+
+def test_recordings_are_kept_after_a_failure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The error names the command that downloads it; otherwise it is complete here."""
+    with (
+        run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
+        robot.client(role="person") as person,
+    ):
+        person.take()
+        with pytest.raises(KeyboardInterrupt), recorded_to(tmp_path / "lost", person, "car"):
+            raise KeyboardInterrupt
+        message = " ".join(capsys.readouterr().err.split())
+        assert f"`shapechanger robot fetch car --out {tmp_path / 'lost'}` downloads it" in message
+        assert not (tmp_path / "lost").exists()
+        person.record(on=False)
+
+        with recorded_to(tmp_path / "kept", person, "car"):
+            person.arm()
+            for _ in range(20):
+                person.exchange((0.0, 0.3), person.ask())
+        (path,) = episodes_of(tmp_path / "kept")
+        episode = read_episode(path)
+        assert episode.closed
+        assert len(episode.steps) == 20
+
+
+def _is_corrected(seen: Observation) -> bool:
+    """Return whether a person drives while the policy suggests."""
+    return seen.commanded[1:] == (0.5,) and bool(seen.suggested)
