@@ -29,7 +29,6 @@ from shapechanger.demos.episodes import (
 from shapechanger.errors import DemosError, OutputError, PolicyError
 from shapechanger.policy import load_policy
 from shapechanger.vehicles.envs.demonstrators import CLONES
-from tests.cli.demos.pictures import grey
 from tests.cli.running import Cli
 from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
 from tests.demos.episodes.making import header, step
@@ -48,6 +47,11 @@ def data(tmp_path: Path) -> Path:
             writer.mark("a <b> bend")
             writer.close("time")
     return tmp_path / "data"
+
+
+def grey(value: int) -> bytes:
+    """Return a uniform grey JPEG of 40 x 30 pixels."""
+    return simplejpeg.encode_jpeg(np.full((30, 40, 3), value, np.uint8))
 
 
 def episodes(data: Path) -> list[Path]:

@@ -147,21 +147,14 @@ def test_cameras_that_differ_are_warped_each_by_its_own_geometry(tmp_path: Path)
 
 
 def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
-    data = _loaded(_record(tmp_path, state=None))
+    """So does one whose vehicle stands all the time."""
+    data = _loaded(_record(tmp_path / "none", state=None))
     with pytest.raises(DemosError, match=r"lacks steering/applied, speed, yaw_rate: give --resp"):
         as_waypoints(data)
     assert as_waypoints(data, SteeringResponse(1.9, 0.0)).kept.sum() == 50
     with pytest.raises(DemosError, match="has no speed, on which the waypoint depends"):
         as_waypoints(data, SteeringResponse(0.8, 3.1))
-    only_speed = Layout((Feature("speed", "m/s"),))
-    data = _loaded(_record(tmp_path / "other", state=only_speed))
-    with pytest.raises(DemosError, match=r"lacks steering/applied, yaw_rate: give --response"):
-        as_waypoints(data)
-
-
-def test_a_motion_that_does_not_tell_the_response_is_refused(tmp_path: Path) -> None:
-    """A vehicle that stands all the time is refused with the option to give."""
-    data = _loaded(_record(tmp_path, 10))
+    data = _loaded(_record(tmp_path / "stands", 10))
     with pytest.raises(DemosError, match=r"drive curves to both sides: give --response RAD_PER_M"):
         as_waypoints(data)
     with pytest.raises(DemosError, match=r"In no step .* drive forward"):
@@ -191,20 +184,17 @@ def test_unsuitable_recordings_are_refused(
     assert not out.exists()
 
 
-def test_several_bodies_are_refused(tmp_path: Path) -> None:
-    _record(tmp_path)
-    _record(tmp_path, body="truck")
+def test_several_bodies_and_no_pictures_are_refused(tmp_path: Path) -> None:
+    _record(tmp_path / "two")
+    _record(tmp_path / "two", body="truck")
     with pytest.raises(DemosError, match="several bodies, car, truck"):
-        _loaded(tmp_path)
-
-
-def test_recordings_without_pictures_are_refused(tmp_path: Path) -> None:
+        _loaded(tmp_path / "two")
     header = EpisodeHeader(action_layout=_ACTIONS.to_json(), clock="none")
-    with EpisodeWriter.create(tmp_path, header) as writer:
+    with EpisodeWriter.create(tmp_path / "blind", header) as writer:
         writer.add(Step(action=(0.0, 0.5), driver="person"))
         writer.close()
     with pytest.raises(DemosError, match="have no images"):
-        as_waypoints(_loaded(tmp_path))
+        as_waypoints(_loaded(tmp_path / "blind"))
 
 
 def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
