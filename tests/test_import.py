@@ -9,6 +9,7 @@ import pytest
 
 import shapechanger
 from shapechanger.envs.catalogue import FINGER_ENVS, ODRL_ENVS, VEHICLE_ENVS
+from tests.drawing import run_python
 
 
 def _ids(*names: str) -> tuple[str, ...]:
@@ -98,6 +99,23 @@ def test_missing_dependencies_of_mujoco_envs_name_the_extra(blocked: str) -> Non
     assert len(lines) == len(every)
     for sentence in lines:
         assert sentence.endswith("run `pip install 'shapechanger[sim]'`.")
+
+
+@pytest.mark.system
+@pytest.mark.parametrize(
+    ("missing", "extra", "command"),
+    [
+        ("stable_baselines3", "learn", "train InvertedPendulum"),
+        ("tensorboard", "learn", "train InvertedPendulum --tensorboard logs"),
+        ("tyro", "cli", "envs list"),
+    ],
+)
+def test_a_command_names_the_missing_extra(missing: str, extra: str, command: str) -> None:
+    script = f"from shapechanger.cli import main; main({command.split()})"
+    done = run_python(_BLOCK.format(blocked=missing) + script)
+    assert done.returncode != 0
+    assert f"pip install 'shapechanger[{extra}]'" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_importing_again_keeps_the_registry() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.running import Cli
+from tests.transfer.own_robot import XML, forget, plan_of, study_of, task_of, write_project
 
 LEARNER = "def build(envs, seed):\n    raise NotImplementedError\n"
 METHOD = """
@@ -80,3 +81,64 @@ def test_names_of_ours_leave_the_path_alone(folder: Path, cli: Cli) -> None:
     """A module next to a policy cannot be imported by naming one of our learners."""
     cli.refused("train", "Ant", "--learner", "ppo-run", "--steps", "10")
     assert str(folder) not in sys.path
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a project called `cliown` and a suite with one finished study of it."""
+    project = tmp_path_factory.mktemp("project")
+    write_project(project, "cliown")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(project)
+        patch.syspath_prepend(str(project))
+        patch.setattr("shapechanger.registry.METHODS._registered", {})
+        study_of(plan_of("cliown", task=task_of("cliown")), Path("suite", "a-to-b"))
+        forget("cliown")
+    return project
+
+
+@pytest.fixture
+def project(done: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """That folder, as an installed program sees it: modules are not looked for there."""
+    monkeypatch.chdir(done)
+    monkeypatch.setattr(sys, "path", [each for each in sys.path if each not in ("", str(done))])
+    monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
+    forget("cliown")
+    return done
+
+
+_POLICY = "suite/a-to-b/runs/scratch-0/policy.safetensors"
+
+
+def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(project: Path, cli: Cli) -> None:
+    """The task is found as `train` finds it; an edited robot or task is refused and named."""
+    evaluate = ("policies", "evaluate", _POLICY, "--episodes", "1")
+    assert "return" in cli.output(*evaluate)
+    assert "cliown_task.py" in cli.output("policies", "show", _POLICY)
+    for file, content, words in (
+        ("b.xml", XML.format(0.5), "its model has changed from"),
+        ("cliown_goal.py", "HEIGHT = 0.7\n", "cliown_goal.py has changed from"),
+    ):
+        was = (project / file).read_text()
+        (project / file).write_text(content)
+        for command, *more in (("evaluate",), ("play", "--out", "film.mp4")):
+            told = " ".join(cli.refused("policies", command, _POLICY, *more).split())
+            assert words in told
+            assert "give --env to try the policy" in told
+        cli.output(*evaluate, "--env", "b.xml@cliown_task:Hold")
+        (project / file).write_text(was)
+    cli.output(*evaluate)
+
+
+def test_a_suite_is_watched_with_own_methods(
+    project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
+) -> None:
+    """From elsewhere the message says where to go, and to delete nothing."""
+    assert "a-to-b" in cli.output("suite", "watch", "suite")
+    monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(project)])
+    monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
+    forget("cliown")
+    monkeypatch.chdir(tmp_path)
+    told = " ".join(cli.refused("suite", "watch", project / "suite").split())
+    assert "go to the folder that the study was started in" in told
+    assert "delete" not in told

@@ -159,38 +159,6 @@ def test_another_study_or_a_file_in_place_of_the_folder_is_refused(
     assert done.stderr.count("error: Cannot write") == 1
 
 
-BLOCKED = """
-import sys
-class Blocked:
-    def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] in {names}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
-sys.meta_path.insert(0, Blocked())
-from shapechanger.cli import main
-main({arguments})
-"""
-
-
-@pytest.mark.parametrize(
-    ("missing", "extra", "arguments"),
-    [
-        ("mujoco", "sim", ["envs", "show", "Ant"]),
-        ("stable_baselines3", "learn", ["train", "InvertedPendulum"]),
-        ("tensorboard", "learn", ["train", "InvertedPendulum", "--tensorboard", "logs"]),
-        ("tyro", "cli", ["envs", "list"]),
-        ("imageio", "sim", ["envs", "render", "Ant", "--out", "ant.png"]),
-    ],
-)
-def test_a_missing_extra_is_named_with_its_command(
-    missing: str, extra: str, arguments: list[str]
-) -> None:
-    code = BLOCKED.format(names={missing}, arguments=arguments)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode != 0
-    assert f"pip install 'shapechanger[{extra}]'" in done.stderr
-    assert "Traceback" not in done.stderr
-
-
 def test_a_robot_and_a_task_of_ones_own_are_studied(tmp_path: Path) -> None:
     """Files and a module of the current folder, in worker processes, in two bodies."""
     (tmp_path / "dog.xml").write_text(DOG)
