@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from importlib.machinery import PathFinder
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import msgspec
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 # Model files, which the fingerprint of the compiled model covers, without comments.
 _MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
-_MOST_CHANGES: Final = 4  # Named in a message.
 _NAMED: Final = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*):[A-Za-z_]\S*")
 _INSTALLED: Final = frozenset(("site-packages", "dist-packages"))
 _NOT_OWN: Final = (
@@ -59,14 +58,13 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
     sensed: str = ""
     files: dict[str, str] = {}
 
-    def changes_to(self, other: Identity, numbers: Iterable[str] = ()) -> str:
+    def changes_to(self, other: Identity) -> str:
         """Describe how another version differs; empty if it is the same.
 
         Models are compared where both are known.
 
         Args:
             other: The other version, which is the newer one.
-            numbers: The differences of the models, if they are known.
         """
 
         def changed(what: str, old: str, new: str) -> Iterator[str]:
@@ -81,27 +79,12 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
             if not found:
                 found += changed("what is sensed of its model", self.sensed, other.sensed)
                 found = [f"{text}, and its motion is the same" for text in found]
-        if found and (known := list(numbers)):
-            more = "; ..." if known[_MOST_CHANGES:] else ""
-            found[0] += f" ({'; '.join(known[:_MOST_CHANGES])}{more})"
         for name in sorted(self.files.keys() | other.files.keys()):
             found += changed(name, self.files.get(name, ""), other.files.get(name, ""))
         return ", and ".join(found)
 
 
-class IdentifiedEnv(NamedTuple):
-    """The identity of an env, with the numbers that its fingerprints are made of.
-
-    Attributes:
-        identity: The identity.
-        numbers: The numbers of its model as MessagePack, to compare models; empty without one.
-    """
-
-    identity: Identity
-    numbers: bytes
-
-
-def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> IdentifiedEnv:
+def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> Identity:
     """Return the identity of an env that has been made.
 
     Args:
@@ -111,14 +94,14 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> IdentifiedEnv:
     arguments: dict[str, Any] = {} if env.spec is None else dict(env.spec.kwargs)
     names = modules_of_env(env, env_id)
     model = getattr(env.unwrapped, "model", None)
-    moved, sensed, numbers = "", "", b""
+    moved, sensed = "", ""
     # No import of MuJoCo for an env that does without.
     compiled = (type(model).__module__.partition(".")[0], type(model).__name__)
     if is_mujoco := compiled == ("mujoco", "MjModel"):
         sees = _sees(env.observation_space)
-        moved, sensed, numbers = MODELS.load("mujoco").read_numbers(model, drawn=sees)
+        moved, sensed = MODELS.load("mujoco").fingerprints(model, drawn=sees)
     files = own_modules(names) | dict(_files(arguments, _MODEL_FILES if is_mujoco else ()))
-    return IdentifiedEnv(Identity(moved, sensed, files), numbers)
+    return Identity(moved, sensed, files)
 
 
 def identify_code(names: Iterable[str], *objects: Any) -> Identity:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 
 import hypothesis.strategies as st
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -200,48 +199,6 @@ def test_json_round_trip(built: BodyMap) -> None:
     again = BodyMap.from_json(built.to_json())
     assert again == built
     assert again.table() == built.table()
-
-
-@st.composite
-def remeasured(draw: st.DrawFn) -> BodyMap:
-    """Draw a map whose features have any units, gains and ranges."""
-    built = draw(maps(scales=st.one_of(SCALES, st.floats(1e-3, 1e3))))
-
-    def measured(layout: Layout) -> Layout:
-        return Layout(
-            tuple(
-                msgspec.structs.replace(
-                    each,
-                    unit=draw(st.sampled_from(["1", "rad", "N·m"])),
-                    low=draw(st.sampled_from([-np.inf, -1.0, 0.0])),
-                    high=draw(st.sampled_from([0.5, np.inf])),
-                    gain=draw(st.sampled_from([1.0, 2.0])),
-                    gain_unit=draw(st.sampled_from(["", "N·m"])),
-                )
-                for each in layout
-            )
-        )
-
-    return BodyMap(*map(measured, built.layouts), built.observation, built.action)
-
-
-@st.composite
-def in_torques(draw: st.DrawFn) -> BodyMap:
-    """Draw a map whose scales keep torques."""
-    drawn = draw(remeasured())
-    names = st.sampled_from(["zero", "hold", "learn"])
-    with contextlib.suppress(MapError):
-        return BodyMap.between(*drawn.layouts, otherwise=draw(names), units="torque")
-    return drawn
-
-
-@law
-@given(built=st.one_of(maps(scales=st.floats(1e-3, 1e3)), remeasured(), in_torques()))
-def test_toml_round_trip(built: BodyMap) -> None:
-    """Every map is equal after TOML, to the last bit, whatever its units, gains and ranges."""
-    text = built.to_toml()
-    assert BodyMap.from_toml(text, *built.layouts) == built
-    assert BodyMap.from_toml(text, *built.layouts).to_toml() == text
 
 
 @law

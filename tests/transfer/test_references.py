@@ -31,7 +31,7 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
     assert policy.card.env == env
     assert (policy.card.steps, policy.card.seed) == (reference.steps, reference.policy_seed)
     assert policy.card.learner == reference.learner
-    assert policy.card.identity == known({ENV: identify(env).identity})
+    assert policy.card.identity == known({ENV: identify(env)})
     # The pendulums' were trained when learners acted in N.
     in_newtons = "Pendulum" in env_id and "Double" not in env_id
     assert default_learner(env) == ("ppo-pendulum" if in_newtons else reference.learner)

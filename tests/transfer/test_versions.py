@@ -54,16 +54,16 @@ def copied(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 _EDITS = {
-    "target's mass": ("b.xml", XML.format(0.5), r"mass 2\.5 kg -> 0\.5 kg"),
+    "target's mass": ("b.xml", XML.format(0.5), r"b\.xml.*: its model has changed from \w+ to \w+"),
     "source's damping": (
         "a.xml",
         XML.format(1.5).replace('damping="5"', 'damping="6"'),
-        r"lift: damping 5 .* -> 6",
+        r"a\.xml.*: its model has changed from \w+ to \w+",
     ),
     "what is sensed": (
         "b.xml",
         XML.format(2.5).replace("</body>", '<site name="tip" pos="0 0 1"/></body>'),
-        "what is sensed of its model has changed .* its motion is the same .*tip: site added",
+        "what is sensed of its model has changed .* its motion is the same",
     ),
     "the task": (
         "shared_task.py",
@@ -90,7 +90,7 @@ def test_an_edited_file_does_not_join_older_runs(edit: str, seeds: int, copied: 
     (copied / file).write_text(content)
     before = files_of(copied / "study")
     plan = plan_of("shared", seeds)
-    with pytest.raises(ForeignStudy, match=f"(?s){text}.*give another --out, or delete"):
+    with pytest.raises(ForeignStudy, match=f"{text}.*give another --out, or delete"):
         study_of(plan, Path("study"))
     assert files_of(copied / "study") == before
 
@@ -168,10 +168,9 @@ def test_a_run_of_another_version_is_refused(copied: Path) -> None:
 
 
 def test_folders_of_two_versions_are_not_merged(copied: Path) -> None:
-    """The message names what differs, in numbers."""
     (copied / "b.xml").write_text(XML.format(0.5))
     study_of(plan_of("shared", arms=("scratch", "zero-shot")), Path("other"))
-    with pytest.raises(ForeignStudy, match=r"(?s)mass 2\.5 kg -> 0\.5 kg.*Merge only folders"):
+    with pytest.raises(ForeignStudy, match=r"its model has changed.*Merge only folders"):
         merge_study([Path("study"), Path("other")], Path("whole"))
     assert not Path("whole").exists()
 
@@ -183,7 +182,7 @@ def test_a_suite_has_one_version_of_each_robot(copied: Path) -> None:
     (copied / "b.xml").write_text(XML.format(0.5))
     task = task_of("shared")
     back = msgspec.structs.replace(task, source=task.target, target=task.source)
-    with pytest.raises(ForeignStudy, match=r"(?s)mass 2\.5 kg.*has one version of each"):
+    with pytest.raises(ForeignStudy, match=r"its model has changed.*has one version of each"):
         open_study_folder(plan_of("shared", task=back), Path("suite"), "b-to-a")
 
 

@@ -99,7 +99,7 @@ def acting_in(
         remedy = (
             "Train it again, or give --env to try the policy in the present version of the env."
         )
-        now = identify_env(env, trained_in.id).identity
+        now = identify_env(env, trained_in.id)
         require_same_env(card.identity, trained_in, now, file, remedy)
     if card.clone is None:
         return _fitting(env, card), policy.act

@@ -250,7 +250,7 @@ class PoliciesConvert:
             )
         env = env_ref(self.env, self.body)
         with opened(env) as made:
-            layouts, identity = layouts_of(made), known({ENV: identify_env(made, env.id).identity})
+            layouts, identity = layouts_of(made), known({ENV: identify_env(made, env.id)})
         convert_zip(self.file, env, layouts, identity, command_line()).save(self.out)
         say(f"wrote {self.out}")
 

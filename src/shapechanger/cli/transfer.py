@@ -168,7 +168,6 @@ class Transfer(TwoEnvs, StudyRuns):
             measure=self.measure,
             traits=traits,
         )
-        _ = traits.shift  # An empty shift is refused before anything is written.
         executor = self.made_executor()
         out = self.out or Path("results", f"{_name(task.source)}-to-{_name(task.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()

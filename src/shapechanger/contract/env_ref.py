@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.errors import LayoutError, ShapechangerError, StudyError, UnknownName
-from shapechanger.identity import IdentifiedEnv, identify_env
+from shapechanger.identity import Identity, identify_env
 from shapechanger.layout import Layout
 
 
@@ -150,7 +150,7 @@ class EnvTraits:
         adapts_source: Whether it can adapt its source.
         family: Name of the continuous family that its body belongs to; may be empty.
         measures: The metrics of a policy, the default first.
-        identified: The version of its robot and of the user's own files.
+        identity: The version of its robot and of the user's own files.
     """
 
     observation_layout: Layout
@@ -163,7 +163,7 @@ class EnvTraits:
     adapts_source: bool
     family: str
     measures: tuple[Measure, ...]
-    identified: IdentifiedEnv
+    identity: Identity
 
     def same_layouts(self, other: EnvTraits) -> bool:
         """Return whether observations and actions mean the same in another env."""
@@ -194,7 +194,7 @@ def env_traits(env: gym.Env[Any, Any], env_id: str = "") -> EnvTraits:
         adapts_source=hasattr(inner, "identified_source"),
         family=getattr(inner, "family_name", ""),
         measures=measures_of(env),
-        identified=identify_env(env, env_id),
+        identity=identify_env(env, env_id),
     )
 
 

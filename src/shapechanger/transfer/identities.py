@@ -11,7 +11,7 @@ import msgspec
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import ForeignStudy
-from shapechanger.identity import IdentifiedEnv, Identity, identify_code, identify_env, texts_in
+from shapechanger.identity import Identity, identify_code, identify_env, texts_in
 
 Identities = dict[str, Identity]
 """Identities by part."""
@@ -22,7 +22,6 @@ LEARNER: Final = "learner"
 """Part of the learner."""
 NOTHING: Final = Identity()
 """Identity of a part without a model and without own files."""
-_OURS: Final = "shapechanger/"
 
 
 def known(identities: Mapping[str, Identity]) -> Identities:
@@ -39,24 +38,22 @@ def identities_in(ref: EnvRef, made: gym.Env[Any, Any], settings: object) -> Ide
     """Return the identities of the env and the learner of a policy."""
     one = single_body(ref)
     env = steady(ref, identify_env(made, ref.id)) if one == ref else identify(ref)
-    return known({ENV: env.identity, LEARNER: identify_learner(settings)})
+    return known({ENV: env, LEARNER: identify_learner(settings)})
 
 
-def identify(ref: EnvRef) -> IdentifiedEnv:
+def identify(ref: EnvRef) -> Identity:
     """Make an env, and return its identity."""
     with closing(single_body(ref).make()) as made:
         return steady(ref, identify_env(made, ref.id))
 
 
-def steady(ref: EnvRef, found: IdentifiedEnv) -> IdentifiedEnv:
+def steady(ref: EnvRef, found: Identity) -> Identity:
     """Return an identity without its model if the env draws another one each time it is made."""
-    if not found.numbers or ref.id.startswith(_OURS):
+    if not found.model or ref.id.startswith("shapechanger/"):
         return found
     with closing(single_body(ref).make()) as made:
-        again = identify_env(made, ref.id).identity
-    if again == found.identity:
-        return found
-    return IdentifiedEnv(Identity(files=found.identity.files), b"")
+        again = identify_env(made, ref.id)
+    return found if again == found else Identity(files=found.files)
 
 
 def single_body(ref: EnvRef) -> EnvRef:

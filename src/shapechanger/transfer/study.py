@@ -24,7 +24,6 @@ from shapechanger.contract.env_ref import (
 from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.errors import (
     ForeignStudy,
-    ShapechangerError,
     SpaceMismatch,
     StudyError,
     UnknownName,
@@ -49,11 +48,7 @@ from shapechanger.transfer.plan import (
 )
 from shapechanger.transfer.references import reference_of
 from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
-from shapechanger.transfer.versions import (
-    changes_between,
-    identities_of_code,
-    keep_models,
-)
+from shapechanger.transfer.versions import changes_between, identities_of_code
 
 STUDY_FILE: Final = "study.json"
 
@@ -112,34 +107,29 @@ class TaskTraits(NamedTuple):
     """Properties of the two envs of a study.
 
     Attributes:
-        certificate: The certificate of the shift as text, empty if the envs publish none; or the
-            error that it was refused with.
+        source: Properties of the source.
+        target: Properties of the target.
+        shift: The certificate of the shift as text; empty if the envs publish none.
     """
 
     source: EnvTraits
     target: EnvTraits
-    certificate: str | ShapechangerError
-
-    @property
-    def shift(self) -> str:
-        """The certificate of the shift."""
-        if isinstance(self.certificate, ShapechangerError):
-            raise self.certificate
-        return self.certificate
+    shift: str
 
 
 def inspect_task(task: TransferTask) -> TaskTraits:
-    """Make both envs of a task once, and read their traits for a study."""
+    """Make both envs of a task once, and read their traits for a study.
+
+    Raises:
+        EmptyShift: If source and target do not differ.
+    """
     with closing(task.source.make()) as source, closing(task.target.make()) as target:
-        traits: list[EnvTraits] = []
-        for ref, made in ((task.source, source), (task.target, target)):
-            found = env_traits(made, ref.id)
-            traits.append(replace(found, identified=steady(ref, found.identified)))
-        try:
-            certificate = certify_shift(source, target)
-        except ShapechangerError as error:
-            certificate = error
-        return TaskTraits(traits[0], traits[1], certificate)
+        one, other = env_traits(source, task.source.id), env_traits(target, task.target.id)
+        return TaskTraits(
+            replace(one, identity=steady(task.source, one.identity)),
+            replace(other, identity=steady(task.target, other.identity)),
+            certify_shift(source, target),
+        )
 
 
 def default_arms(traits: TaskTraits) -> tuple[str, ...]:
@@ -221,7 +211,7 @@ def make_plan(
         require_same_env(
             origin.identity,
             task.source,
-            traits.source.identified.identity,
+            traits.source.identity,
             source_policy,
             "Train it again, or leave out the given policy to train one for each seed.",
         )
@@ -266,12 +256,7 @@ def make_plan(
             "python": platform.python_version(),
             **{name: version_of(name) for name in (*_PACKAGES, *settings.packages)},
         },
-        identity=known(
-            {
-                "source": traits.source.identified.identity,
-                "target": traits.target.identified.identity,
-            }
-        )
+        identity=known({"source": traits.source.identity, "target": traits.target.identity})
         | identities_of_code(settings, arms),
     )
 
@@ -328,9 +313,7 @@ def run_study(
     if (_digest(source_policy) if source_policy else "") != plan.source_policy:
         raise StudyError("The source policy is not the one that this study was planned with.")
     traits = inspect_task(plan.task) if traits is None else traits
-    shift = traits.shift
     claim_folder(plan, out)
-    keep_models(out, traits.source.identified, traits.target.identified)
     jobs: list[Job] = []
     for run in unfinished_runs(plan, out):
         needs = run.kind in plan.arms and load_method(run.kind).uses_source_policy
@@ -357,7 +340,7 @@ def run_study(
         plan=plan,
         command=command,
         machine=f"{platform.system()} {platform.machine()}",
-        shift=shift,
+        shift=traits.shift,
         runs=results,
         source_return=tuple(r.curve[-1].mean_return for r in results if r.run.kind == SOURCE),
         summaries={},
@@ -397,7 +380,7 @@ def claim_folder(plan: Plan, out: Path) -> None:
         found = _plan_in(out)
         if plan.extends(found):
             write_json(path, plan)
-        elif text := changes_between(found, plan, out):
+        elif text := changes_between(found, plan):
             raise ForeignStudy(
                 f"{out} holds runs with other versions of what this study names. {text}. Runs of "
                 "both would be averaged: give another --out, or delete that folder to start again; "

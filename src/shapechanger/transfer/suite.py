@@ -73,7 +73,7 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
     identity = {part: each for plan in reversed(plans) for part, each in plan.identity.items()}
     whole = msgspec.structs.replace(plans[0], arms=arms, seeds=seeds, identity=identity)
     for plan, folder in zip(plans, folders, strict=True):
-        if text := changes_between(whole, plan, folders[0], folder):
+        if text := changes_between(whole, plan):
             raise ForeignStudy(
                 f"{folders[0]} and {folder} hold runs with different versions of an env, a learner "
                 f"or a method. {text}. Merge only folders of one version; nothing was changed."
@@ -105,7 +105,7 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
     """Copy the runs of another study that are the same here."""
     remedy = f"delete {sibling} to repeat that study"
     other = read_plan(sibling, remedy)
-    if text := changes_between(other, plan, sibling, folder):
+    if text := changes_between(other, plan):
         raise ForeignStudy(
             f"{sibling} was run with another version of an env, a learner or a method. {text}. A "
             f"suite has one version of each: give another --out, or delete {sibling} to repeat it."

@@ -306,7 +306,7 @@ class CloneLearner(Learner[CloningSettings]):
 
 def stated(policy: CameraPolicy, env: EnvRef, steps: int, seed: int, **data: Any) -> CameraPolicy:
     """State in a clone's card the env, and the steps and seed of all of its training."""
-    identity = known({ENV: identify(env).identity})
+    identity = known({ENV: identify(env)})
     return policy.carded(env=env, steps=steps, seed=seed).described(identity=identity, **data)
 
 
@@ -362,7 +362,7 @@ def train_student(
                 f"train one by `shapechanger train {name}`."
             )
         if ENV in teacher.card.identity:
-            now = identify(learned_in).identity
+            now = identify(learned_in)
             remedy = "Train the teacher again."
             require_same_env(teacher.card.identity, learned_in, now, "the teacher", remedy)
         driver = inner.taught_by(teacher.act, seed)

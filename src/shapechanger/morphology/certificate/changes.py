@@ -310,21 +310,6 @@ def _rounded(values: Values, scale: float) -> Values:
     )
 
 
-def read_numbers(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str, bytes]:
-    """Return the fingerprints of the motion and of other numbers, and all as MessagePack."""
-    moved, sensed = moved_numbers(model), sensed_numbers(model, drawn=drawn)
-    return _digest_of(moved), _digest_of(sensed), msgspec.msgpack.encode([moved, sensed])
-
-
-def changed_numbers(old: bytes, new: bytes) -> tuple[str, ...]:
-    """Return the differences in words between the numbers of two models, see `read_numbers`.
-
-    Raises:
-        msgspec.MsgspecError: If they are not such numbers.
-    """
-    (moved, sensed), (new_moved, new_sensed) = (
-        msgspec.msgpack.decode(each, type=tuple[Numbers, Numbers]) for each in (old, new)
-    )
-    # A geom that moves differently also lies differently.
-    found = differences(moved, new_moved) or differences(sensed, new_sensed)
-    return tuple(item.sentence for item in grouped(found))
+def fingerprints(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str]:
+    """Return the fingerprints of what decides a model's motion and of what else may be sensed."""
+    return fingerprint(model), _digest_of(sensed_numbers(model, drawn=drawn))

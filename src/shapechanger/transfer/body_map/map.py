@@ -19,7 +19,6 @@ from shapechanger.transfer.body_map.matching import (
     constant_rule,
     read_toml,
     resolve,
-    write_toml,
 )
 from shapechanger.transfer.body_map.mirror import mirrored_entries
 from shapechanger.transfer.body_map.rules import (
@@ -255,8 +254,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             SpaceMismatch: If the last axis has another length.
         """
         action = self._halves[1](source_action)
-        low, high = self._action_bounds
-        return np.clip(action, low.astype(action.dtype), high.astype(action.dtype))
+        low, high = (end.astype(action.dtype) for end in self._action_bounds)
+        return np.clip(action, low, high)
 
     @property
     def observation_matrix(self) -> NDArray[np.float64]:
@@ -360,10 +359,6 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             return msgspec.json.decode(text, type=cls)
         except msgspec.MsgspecError as error:
             raise MapError(f"This is not a body map: {error}.") from error
-
-    def to_toml(self) -> str:
-        """Write the rules as TOML, without the layouts, for editing by hand."""
-        return write_toml(self._halves)
 
     @classmethod
     def from_toml(cls, text: str, *layouts: Layout) -> BodyMap:

@@ -24,7 +24,6 @@ Each part may be left out. Features with the same name in both bodies need no li
 from __future__ import annotations
 
 import fnmatch
-import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, Literal, TypeVar, get_args
@@ -37,7 +36,6 @@ from shapechanger.transfer.body_map.rules import (
     BY_DEFAULT,
     SAME_NAME,
     Copy,
-    Half,
     Hold,
     Learn,
     MapEntry,
@@ -226,49 +224,6 @@ def read_toml(text: str) -> MapText:
     for rules in (found.observation, found.action):
         rules |= {name: _rule(name, value) for name, value in rules.items()}
     return found
-
-
-def write_toml(halves: Sequence[Half]) -> str:
-    """Write rules as TOML; a partner of the same name has no line."""
-    plain = all(_is_plain(entry, half.side) for half in halves for entry in half.entries)
-    units = "same" if plain else "exact"
-    lines = [f'units = "{units}"', 'otherwise = "zero"']
-    for half in halves:
-        explicit = [entry for entry in half.entries if entry.rule != Copy(entry.feature)]
-        if explicit:
-            lines += ["", f"[{half.side.name}]"]
-            lines += [f"{_quoted(entry.feature)} = {_value(entry.rule)}" for entry in explicit]
-    return "\n".join(lines) + "\n"
-
-
-def _is_plain(entry: MapEntry, side: Side) -> bool:
-    """Return whether an entry passes the checks of `units = "same"`."""
-    feature = side.into[entry.feature]
-    try:
-        if isinstance(entry.rule, Copy):
-            _suited(entry.rule, feature, side, "same")
-        else:
-            constant_rule(entry.rule, feature)
-    except MapError:  # For example after a conversion to torques by a factor of 1.
-        return False
-    return True
-
-
-def _value(rule: Rule) -> str:
-    match rule:
-        case Copy(feature, scale):
-            return f"{{ take = {_quoted(feature)}, scale = {float(scale)!r} }}"
-        case Hold(value):
-            return f"{{ hold = {float(value)!r} }}"
-        case Zero():
-            return '"zero"'
-        case Learn():
-            return '"learn"'
-
-
-def _quoted(name: str) -> str:
-    """A basic string of TOML: JSON, with the one control character that JSON does not escape."""
-    return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _rule(name: str, value: object) -> RuleLike:
