@@ -48,8 +48,8 @@ class Job:
     attempts: int = 3
 
 
-Event = tuple[str, Literal["steps", "ended", "failed", "lost"], Any]
-"""Name of a job, what happened, and its steps, its error or how its process was lost."""
+Event = tuple[str, Literal["steps", "done", "lost"], Any]
+"""Name of a job, what happened, and its steps, its failure (None without), or how it was lost."""
 
 
 class Executor:
@@ -93,7 +93,7 @@ class Executor:
                         on_progress(name, content, False)
                         continue
                     job = running.pop(name)
-                    if kind == "ended":
+                    if kind == "done" and content is None:
                         ended.add(name)
                         on_progress(name, steps[name], True)
                         continue
@@ -151,6 +151,19 @@ def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
     return forward
 
 
+def failure_of(
+    function: Callable[..., None], arguments: tuple[Any, ...], report: ReportSteps
+) -> ShapechangerError | str | None:
+    """Perform a job for another process; return its error or its traceback, None if it ended."""
+    try:
+        function(*arguments, report)
+    except ShapechangerError as error:
+        return error
+    except Exception:  # It crosses to the process that reports it.
+        return traceback.format_exc()
+    return None
+
+
 class Serial(Executor):
     """Runs jobs one after another in this process, for debugging; raises what the first raises."""
 
@@ -169,7 +182,7 @@ class Serial(Executor):
             self._on_progress(job.name, steps, False)
 
         job.function(*job.arguments, report)
-        yield job.name, "ended", None
+        yield job.name, "done", None
 
 
 class Processes(Executor):
@@ -249,14 +262,7 @@ def _serve(connection: Connection) -> None:
             function, arguments = connection.recv()
         except EOFError:
             return
-        try:
-            function(*arguments, report)
-        except ShapechangerError as error:
-            connection.send(("failed", error))
-        except Exception:  # It crosses to the parent, which reports it.
-            connection.send(("failed", traceback.format_exc()))
-        else:
-            connection.send(("ended", None))
+        connection.send(("done", failure_of(function, arguments, report)))
 
 
 def _end_with_parent() -> None:

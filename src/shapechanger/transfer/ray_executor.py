@@ -11,13 +11,19 @@ import os
 import socket
 import subprocess
 import sys
-import traceback
 from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any, Final
 
-from shapechanger.errors import MissingExtra, ShapechangerError, StudyError
-from shapechanger.transfer.executor import Event, Executor, Job, OnProgress, throttled
+from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.transfer.executor import (
+    Event,
+    Executor,
+    Job,
+    OnProgress,
+    failure_of,
+    throttled,
+)
 
 # Set before Ray is imported; otherwise Ray reports usage statistics.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -85,11 +91,9 @@ class RayCluster(Executor):
         for task in done:
             name = self._names.pop(task)
             try:
-                failure: ShapechangerError | str | None = _ray.get(task)
+                yield name, "done", _ray.get(task)
             except RayError as error:  # The worker or its node is gone.
                 yield name, "lost", type(error).__name__
-                continue
-            yield name, "ended" if failure is None else "failed", failure
 
     def _close(self) -> None:
         for task in self._names:
@@ -137,16 +141,7 @@ class _Board:
         return steps
 
 
-def _perform(
-    function: Any, arguments: tuple[Any, ...], name: str, board: Any
-) -> ShapechangerError | str | None:
-    """Perform a job on a node; return the error or the traceback if it failed."""
-    try:
-        function(
-            *arguments, throttled(lambda steps: board.put.remote(name, steps), _REPORT_EVERY_S)
-        )
-    except ShapechangerError as error:
-        return error
-    except Exception:  # It crosses to the program that started the study.
-        return traceback.format_exc()
-    return None
+def _perform(function: Any, arguments: tuple[Any, ...], name: str, board: Any) -> Any:
+    """Perform a job on a node."""
+    report = throttled(lambda steps: board.put.remote(name, steps), _REPORT_EVERY_S)
+    return failure_of(function, arguments, report)

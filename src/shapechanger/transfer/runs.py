@@ -79,15 +79,12 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
 
 def last_evaluation(study: Path, run: Run) -> Evaluation | None:
     """Return the last evaluation of a run so far; None before the first."""
-    path = run.folder(study) / _CURVE
     try:
         # The last line may be half-written.
-        *_, last = (
-            line for line in path.read_bytes().splitlines(keepends=True) if line[-1:] == b"\n"
-        )
-        return msgspec.json.decode(last, type=Evaluation)
-    except (FileNotFoundError, ValueError, msgspec.MsgspecError):
+        *lines, _ = (run.folder(study) / _CURVE).read_bytes().split(b"\n")
+    except FileNotFoundError:
         return None
+    return msgspec.json.decode(lines[-1], type=Evaluation) if lines else None
 
 
 def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: ReportSteps) -> None:

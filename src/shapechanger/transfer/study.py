@@ -56,6 +56,7 @@ STUDY_FILE: Final = "study.json"
 _ADAPTED: Final = ("randomised", "identified")
 # Packages that the numbers depend on.
 _PACKAGES: Final = ("numpy", "scipy", "gymnasium", "mujoco", "torch", "stable-baselines3")
+_KEPT: Final = "give another --out, or delete that folder to start again; nothing was changed"
 
 
 class Study(msgspec.Struct, frozen=True, kw_only=True):
@@ -365,7 +366,7 @@ def is_folder_of(plan: Plan, out: Path) -> bool:
     """Return whether `out` is the folder of this study, or of a part of it."""
     if not (out / PLAN_FILE).exists():
         return False
-    found = _plan_in(out)
+    found = read_plan(out, _KEPT)
     return found == plan or plan.extends(found)
 
 
@@ -376,31 +377,17 @@ def claim_folder(plan: Plan, out: Path) -> None:
     """
     make_folder(out)
     path = out / PLAN_FILE
-    if path.exists():
-        found = _plan_in(out)
-        if plan.extends(found):
-            write_json(path, plan)
-        elif text := changes_between(found, plan):
-            raise ForeignStudy(
-                f"{out} holds runs with other versions of what this study names. {text}. Runs of "
-                "both would be averaged: give another --out, or delete that folder to start again; "
-                "nothing was changed."
-            )
-        elif found != plan:
-            raise ForeignStudy(
-                f"{out} holds another study, which differs in {plan.difference(found)}: give "
-                "another --out, or delete that folder."
-            )
+    if not path.exists():
+        if any(out.iterdir()):
+            raise ForeignStudy(f"{out} holds other files and no study: give another --out.")
+        write_json(path, plan)
         return
-    if any(out.iterdir()):
-        raise ForeignStudy(f"{out} holds other files and no study: give another --out.")
-    write_json(path, plan)
-
-
-def _plan_in(out: Path) -> Plan:
-    return read_plan(
-        out, "give another --out, or delete that folder to start again; nothing was changed"
-    )
+    found = read_plan(out, _KEPT)
+    if plan.extends(found):
+        write_json(path, plan)
+    elif found != plan:
+        text = changes_between(found, plan) or f"it differs in {plan.difference(found)}"
+        raise ForeignStudy(f"{out} holds another study ({text}): {_KEPT}.")
 
 
 def _digest(policy: Path) -> str:

@@ -73,15 +73,11 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
     identity = {part: each for plan in reversed(plans) for part, each in plan.identity.items()}
     whole = msgspec.structs.replace(plans[0], arms=arms, seeds=seeds, identity=identity)
     for plan, folder in zip(plans, folders, strict=True):
-        if text := changes_between(whole, plan):
-            raise ForeignStudy(
-                f"{folders[0]} and {folder} hold runs with different versions of an env, a learner "
-                f"or a method. {text}. Merge only folders of one version; nothing was changed."
-            )
         if whole != plan and not whole.extends(plan):
+            text = changes_between(whole, plan) or f"they differ in {whole.difference(plan)}"
             raise ForeignStudy(
-                f"{folders[0]} and {folder} hold different studies, which differ in "
-                f"{whole.difference(plan)}."
+                f"{folders[0]} and {folder} hold different studies ({text}). Merge only folders of "
+                "one version; nothing was changed."
             )
     claim_folder(whole, out)
     for run in whole.runs():

@@ -36,7 +36,6 @@ def summary(
         source_steps=source_steps,
         rng=np.random.default_rng(0),
         last_k=1,
-        n_resamples=500,
     )
 
 
@@ -115,7 +114,7 @@ def test_both_ways_of_counting_use_the_same_resamples() -> None:
     draw = int(np.random.default_rng(0).integers(2**63))
     curves = REFERENCE.scores(ARM, clip=True), REFERENCE.scores(SCRATCH, clip=True)
     rng = np.random.default_rng(draw)
-    transfer = forward_transfer(*curves, rng=rng, n_resamples=500)
+    transfer = forward_transfer(*curves, rng=rng)
     assert result.in_target_steps.forward_transfer == transfer
     undefined = summary(reference=Reference(zero=400.0, one=300.0)).in_target_steps
     assert [time.threshold for time in undefined.times_to_threshold] == [0.25, 0.5, 0.75, 0.9]

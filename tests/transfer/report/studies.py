@@ -156,7 +156,6 @@ def _summaries(plan: Plan, drawn: dict[str, NDArray[np.float64]]) -> dict[str, S
             source_steps=plan.source_steps,
             rng=np.random.default_rng(plan.seed),
             last_k=plan.last_k,
-            n_resamples=300,
         )
         for arm in plan.arms
         if arm != "scratch"

@@ -36,9 +36,7 @@ _ROUNDING: Final = 1e-12
 _LEAST_SPREAD: Final = 1e-60
 # A quarter of the runs is left out at each end of an interquartile mean.
 _TRIMMED: Final = 0.25
-
-# One for each tail.
-_FEWEST_RESAMPLES: Final = 40
+_POOLED_RESAMPLES: Final = 2000
 _NO_TAILS: Final = "No interval: too many resamples have no ratio, or no spread to judge it by."
 
 
@@ -116,16 +114,9 @@ def estimate_ratio(
         least: Smallest mean of scratch that the ratio may be taken over, > 0.
         too_small: Why the ratio is undefined below that; the note of the estimate.
         rng: Draws the resamples.
-        n_resamples: Number of resamples: at least one for each tail, thousands for an interval that
-            hardly depends on `rng`.
-
-    Raises:
-        StudyError: If there are too few resamples.
+        n_resamples: Number of resamples: at least 40, one for each tail; thousands for an interval
+            that hardly depends on `rng`.
     """
-    if n_resamples < _FEWEST_RESAMPLES:
-        raise StudyError(
-            f"A bootstrap interval needs at least {_FEWEST_RESAMPLES} resamples, got {n_resamples}."
-        )
     if not scratch.mean() >= least:
         return undefined(too_small)
     if no_interval := _why_no_interval(arm, scratch):
@@ -180,18 +171,12 @@ def _spread(sample: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(np.ptp(sample, axis=-1) > np.maximum(_LEAST_SPREAD, _ROUNDING * size))
 
 
-def interquartile_mean(
-    scores: _Groups,
-    *,
-    rng: np.random.Generator,
-    n_resamples: int = 2000,
-) -> Estimate:
+def interquartile_mean(scores: _Groups, *, rng: np.random.Generator) -> Estimate:
     """Mean of the middle half of all runs, in units of score.
 
     Args:
         scores: For each study one number for each run, shape (n_runs,).
         rng: Draws the resamples.
-        n_resamples: Number of resamples.
 
     Raises:
         StudyError: If there are no runs.
@@ -200,17 +185,13 @@ def interquartile_mean(
 
     _require_runs(scores)
     mean: Any = stats.trim_mean(np.concatenate(scores), _TRIMMED)
-    drawn = np.concatenate([_drawn(group, n_resamples, rng) for group in scores], axis=1)
+    drawn = np.concatenate([_drawn(group, rng) for group in scores], axis=1)
     means: Any = stats.trim_mean(drawn, _TRIMMED, axis=1)
     return _between(float(mean), means)
 
 
 def probability_of_improvement(
-    arm: _Groups,
-    scratch: _Groups,
-    *,
-    rng: np.random.Generator,
-    n_resamples: int = 2000,
+    arm: _Groups, scratch: _Groups, *, rng: np.random.Generator
 ) -> Estimate:
     """Probability that a run of the arm ends above a run of scratch, averaged over studies.
 
@@ -220,7 +201,6 @@ def probability_of_improvement(
         arm: For each study one number for each run of the arm.
         scratch: The same of scratch, in the same order of studies.
         rng: Draws the resamples.
-        n_resamples: Number of resamples.
 
     Raises:
         StudyError: If there are no runs, or not as many studies of both.
@@ -229,12 +209,9 @@ def probability_of_improvement(
     _require_runs(scratch)
     if len(arm) != len(scratch):
         raise StudyError(f"There are {len(arm)} studies of the arm and {len(scratch)} of scratch.")
-
-    chances = [
-        _chance(_drawn(x, n_resamples, rng), _drawn(y, n_resamples, rng))
-        for x, y in zip(arm, scratch, strict=True)
-    ]
-    value = np.mean([_chance(x[None], y[None]) for x, y in zip(arm, scratch, strict=True)])
+    pairs = list(zip(arm, scratch, strict=True))
+    chances = [_chance(_drawn(x, rng), _drawn(y, rng)) for x, y in pairs]
+    value = np.mean([_chance(x[None], y[None]) for x, y in pairs])
     return _between(float(value), np.mean(chances, axis=0))
 
 
@@ -243,16 +220,13 @@ def _chance(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float6
     return 0.5 + 0.5 * np.sign(x[:, :, None] - y[:, None, :]).mean(axis=(1, 2))
 
 
-def _require_runs(groups: Sequence[NDArray[np.float64]]) -> None:
-    """Refuse studies without runs."""
+def _require_runs(groups: _Groups) -> None:
     if not groups or any(group.size == 0 for group in groups):
         raise StudyError("Each study needs at least one run.")
 
 
-def _drawn(
-    group: NDArray[np.float64], n_resamples: int, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    return group[rng.integers(group.size, size=(n_resamples, group.size))]
+def _drawn(group: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    return group[rng.integers(group.size, size=(_POOLED_RESAMPLES, group.size))]
 
 
 def _between(value: float, draws: NDArray[np.float64]) -> Estimate:

@@ -103,11 +103,7 @@ def total_reward_gain(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
 
 
 def auc_ratio(
-    arm: LearningCurves,
-    scratch: LearningCurves,
-    *,
-    rng: np.random.Generator,
-    n_resamples: int = 10_000,
+    arm: LearningCurves, scratch: LearningCurves, *, rng: np.random.Generator
 ) -> Estimate:
     """Ratio of the areas under the curves of arm and scratch, a pure number; 1 if they are equal.
 
@@ -119,7 +115,6 @@ def auc_ratio(
         arm: Scores of the arm.
         scratch: Scores of the baseline, evaluated at the same steps.
         rng: Draws the resamples.
-        n_resamples: Number of resamples.
 
     Raises:
         StudyError: If the curves cannot be compared.
@@ -133,7 +128,6 @@ def auc_ratio(
         least=_ZERO_AREA,
         too_small="Undefined: the area under scratch's curve is not above zero.",
         rng=rng,
-        n_resamples=n_resamples,
     )
 
 
@@ -143,11 +137,7 @@ MIN_HEADROOM: Final = 0.01
 
 
 def forward_transfer(
-    arm: LearningCurves,
-    scratch: LearningCurves,
-    *,
-    rng: np.random.Generator,
-    n_resamples: int = 10_000,
+    arm: LearningCurves, scratch: LearningCurves, *, rng: np.random.Generator
 ) -> Estimate:
     """Forward transfer of Continual World, a pure number of at most 1; 0 means no effect.
 
@@ -160,7 +150,6 @@ def forward_transfer(
         arm: Scores of the arm from `Reference.scores(..., clip=True)`.
         scratch: Scores of the baseline, clipped too and evaluated at the same steps.
         rng: Draws the resamples.
-        n_resamples: Number of resamples.
 
     Raises:
         StudyError: If the curves cannot be compared or leave [0, 1].
@@ -181,7 +170,6 @@ def forward_transfer(
         least=MIN_HEADROOM,
         too_small=f"Undefined: scratch leaves a headroom of less than {MIN_HEADROOM:g}.",
         rng=rng,
-        n_resamples=n_resamples,
     )
     # A headroom is never negative, but the interval can be.
     least = None if left.low is None else max(left.low, 0.0)
@@ -239,8 +227,14 @@ def steps_to_reach(curves: LearningCurves, threshold: float) -> NDArray[np.float
     """
     if curves.source_steps > 0.0 and curves.floor >= threshold:
         return np.zeros(curves.n_seeds)
-    times = [_first_step(curves.steps, row, threshold) for row in curves.returns]
-    steps = np.array(times) + curves.source_steps
+    times = np.full(curves.n_seeds, np.inf)
+    for seed, row in enumerate(curves.returns):
+        above = np.flatnonzero(row >= threshold)
+        if above.size:
+            # The curve rises from below the threshold, so its inverse is defined here.
+            around = slice(max(int(above[0]) - 1, 0), int(above[0]) + 1)
+            times[seed] = np.interp(threshold, row[around], curves.steps[around])
+    steps = times + curves.source_steps
     return np.where(steps <= curves.horizon, steps, np.inf)
 
 
@@ -278,19 +272,6 @@ def time_to_threshold(
         _reach_times(scratch_steps, scratch.horizon),
         saved,
     )
-
-
-def _first_step(steps: NDArray[np.float64], row: NDArray[np.float64], threshold: float) -> float:
-    """First crossing of one curve in its own steps; infinity if the curve never crosses."""
-    above = np.flatnonzero(row >= threshold)
-    if above.size == 0:
-        return math.inf
-    after = int(above[0])
-    if after == 0:
-        return 0.0
-    # The curve rises from below the threshold, so its inverse is defined here.
-    around = slice(after - 1, after + 1)
-    return float(np.interp(threshold, row[around], steps[around]))
 
 
 def _reach_times(steps: NDArray[np.float64], horizon: float) -> ReachTimes:
@@ -365,8 +346,7 @@ def summarise(
     *,
     source_steps: float,
     rng: np.random.Generator,
-    last_k: int = 5,
-    n_resamples: int = 10_000,
+    last_k: int,
 ) -> Summary:
     """Compute all measures of one arm against scratch, in target steps and in total steps.
 
@@ -379,7 +359,6 @@ def summarise(
         rng: Draws the resamples. Both ways of counting use the same ones, so that without source
             steps they are equal.
         last_k: Number of final evaluations that are averaged.
-        n_resamples: Resamples of each bootstrap interval.
 
     Raises:
         StudyError: If the curves cannot be compared, or an argument is out of range.
@@ -392,15 +371,10 @@ def summarise(
         baseline, ratio, transfer = scratch, undefined(_NO_SCORES), undefined(_NO_SCORES)
         times = tuple(TimeToThreshold(height, None, None, ratio) for height in DEFAULT_THRESHOLDS)
         if reference.defined:
-            transfer = forward_transfer(
-                reference.scores(arm, clip=True),
-                reference.scores(baseline, clip=True),
-                rng=np.random.default_rng(draws),
-                n_resamples=n_resamples,
-            )
+            clipped = (reference.scores(curves, clip=True) for curves in (arm, baseline))
+            transfer = forward_transfer(*clipped, rng=np.random.default_rng(draws))
             arm, baseline = reference.scores(arm), reference.scores(baseline)
-            again = np.random.default_rng(draws)
-            ratio = auc_ratio(arm, baseline, rng=again, n_resamples=n_resamples)
+            ratio = auc_ratio(arm, baseline, rng=np.random.default_rng(draws))
             times = tuple(time_to_threshold(arm, baseline, at) for at in DEFAULT_THRESHOLDS)
         return Measures(
             jumpstart=jumpstart(arm, baseline),

@@ -19,11 +19,7 @@ from shapechanger.transfer.body_map import BodyMap, Copy
 from shapechanger.transfer.body_map.rules import SAME_NAME
 from shapechanger.transfer.learners.presets import tuning_text
 from shapechanger.transfer.report.verdict import (
-    ASYMPTOTIC_GAIN,
     GOOD,
-    JUMPSTART,
-    TIME_TO_THRESHOLD,
-    TOTAL_REWARD_GAIN,
     ArmRow,
     MeasureRow,
     arm_rows,
@@ -39,7 +35,6 @@ from shapechanger.transfer.study import Study
 Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 """The source's body and the target's, each of shape (height, width, 3)."""
 
-_HEADLINE: Final = (TOTAL_REWARD_GAIN, JUMPSTART, ASYMPTOTIC_GAIN)
 _MAX_ARGUMENT_LENGTH: Final = 40
 # Names of kinds of runs that are no arms.
 _ARMS: Final = {"random": "random actions", "source": "source policy, in the source"}
@@ -152,12 +147,10 @@ def argument_text(value: object) -> str:
 
 
 def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str]]:
-    """The numbers that the verdict rests on, in target steps and in total steps."""
+    """The gains and the last time that the verdict rests on, by target steps and total steps."""
     rows = [row for row in measures if row.arm == study.headline_arm]
-    wanted = [row for name in _HEADLINE for row in rows if row.measure == name]
-    wanted += [row for row in rows if row.measure.startswith(TIME_TO_THRESHOLD)][-1:]
     cards: list[dict[str, str]] = []
-    for row in wanted:
+    for row in (rows[1], rows[0], rows[2], rows[-1]):
         if row.target == UNDEFINED:
             continue
         value, bracket, interval = row.target.partition(" [")

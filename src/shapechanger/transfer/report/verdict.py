@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Final, Literal, NamedTuple
 
@@ -24,21 +24,16 @@ from shapechanger.transfer.plan import NO_SKILL, SOURCE
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
 
-JUMPSTART: Final = "Jumpstart"
-TOTAL_REWARD_GAIN: Final = "Total reward gain"
-ASYMPTOTIC_GAIN: Final = "Asymptotic gain"
-AUC_RATIO: Final = "Area ratio"
-FORWARD_TRANSFER: Final = "Forward transfer"
-TIME_TO_THRESHOLD: Final = "Time to threshold"
-
-# Measures that are not times, with their fields of `Measures`.
-_FIELDS: Final = {
-    JUMPSTART: "jumpstart",
-    TOTAL_REWARD_GAIN: "total_reward_gain",
-    ASYMPTOTIC_GAIN: "asymptotic_gain",
-    AUC_RATIO: "auc_ratio",
-    FORWARD_TRANSFER: "forward_transfer",
-}
+# Name, field of `Measures` and sign of each measure that is not a time; the first three are gains,
+# in the unit of the summary, and the others pure numbers.
+_MEASURES: Final = (
+    ("Jumpstart", "jumpstart", True),
+    ("Total reward gain", "total_reward_gain", True),
+    ("Asymptotic gain", "asymptotic_gain", True),
+    ("Area ratio", "auc_ratio", False),
+    ("Forward transfer", "forward_transfer", True),
+)
+_GAINS: Final = 3
 
 
 def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
@@ -61,18 +56,14 @@ class MeasureRow(NamedTuple):
 def measure_rows(study: Study) -> tuple[MeasureRow, ...]:
     """Format every measure of every arm other than scratch, gains first."""
     rows: list[MeasureRow] = []
-    for arm in study.plan.arms:
-        if arm == "scratch":
-            continue
-        summary = study.summaries[arm]
+    for arm, summary in study.summaries.items():
         ours, total = summary.in_target_steps, summary.in_total_steps
-        for name, field in _FIELDS.items():
-            pure = name in (AUC_RATIO, FORWARD_TRANSFER)
-            unit = "pure number" if pure else summary.unit
+        for i, (name, field, signed) in enumerate(_MEASURES):
+            unit = summary.unit if i < _GAINS else "pure number"
             both: tuple[Estimate, Estimate] = getattr(ours, field), getattr(total, field)
-            rows.append(_measure_row(arm, name, unit, *both, signed=name != AUC_RATIO))
+            rows.append(_measure_row(arm, name, unit, *both, signed=signed))
         for here, there in zip(ours.times_to_threshold, total.times_to_threshold, strict=True):
-            name = f"{TIME_TO_THRESHOLD} {here.threshold:g}: steps saved"
+            name = f"Time to threshold {here.threshold:g}: steps saved"
             row = _measure_row(arm, name, "steps", here.steps_saved, there.steps_saved, signed=True)
             reached = _reached(arm, summary, here, there)
             rows.append(row._replace(note=" ".join(filter(None, (reached, row.note)))))
@@ -83,7 +74,6 @@ def _measure_row(
     arm: str, measure: str, unit: str, target: Estimate, total: Estimate, *, signed: bool
 ) -> MeasureRow:
     """One row; what both ways of counting share appears once."""
-    methods = [estimate.method for estimate in (target, total)]
     sides = (("In target steps", target), ("In total steps", total))
     notes = [f"{where}: {estimate.note}" for where, estimate in sides if estimate.note]
     return MeasureRow(
@@ -92,7 +82,7 @@ def _measure_row(
         unit=unit,
         target=estimate_text(target, signed=signed),
         total=estimate_text(total, signed=signed),
-        method=methods[0] if methods[0] == methods[1] else " / ".join(methods),
+        method=" / ".join(dict.fromkeys((target.method, total.method))),
         note=target.note if target.note == total.note else " ".join(notes),
     )
 
@@ -101,23 +91,22 @@ def _reached(
     arm: str, summary: Summary, in_target: TimeToThreshold, in_total: TimeToThreshold
 ) -> str:
     """Describe how many seeds reached a threshold and how soon; empty if undefined."""
-    if in_target.arm is None or in_target.scratch is None or in_total.arm is None:
+    ours, total, scratch = in_target.arm, in_total.arm, in_target.scratch
+    if ours is None or total is None or scratch is None:
         return ""
-    reaches = (in_target.arm, in_total.arm, in_target.scratch)
-    missed = any(reach.fraction < 1.0 for reach in reaches)
+
+    def seeds(reach: ReachTimes, n_seeds: int) -> str:
+        return f"{round(reach.fraction * n_seeds)} of {n_seeds} seeds"
+
+    missed = any(reach.fraction < 1.0 for reach in (ours, total, scratch))
     censored = f" Runs that did not reach it count as {count(summary.horizon)}." if missed else ""
     return (
-        f"Reached by {_seeds(in_target.arm, summary.n_seeds_arm)} of {arm} after a mean of "
-        f"{count(in_target.arm.restricted_mean)} steps; in total steps by "
-        f"{_seeds(in_total.arm, summary.n_seeds_arm)} after {count(in_total.arm.restricted_mean)}; "
-        f"by {_seeds(in_target.scratch, summary.n_seeds_scratch)} of scratch after "
-        f"{count(in_target.scratch.restricted_mean)}.{censored}"
+        f"Reached by {seeds(ours, summary.n_seeds_arm)} of {arm} after a mean of "
+        f"{count(ours.restricted_mean)} steps; in total steps by "
+        f"{seeds(total, summary.n_seeds_arm)} after {count(total.restricted_mean)}; "
+        f"by {seeds(scratch, summary.n_seeds_scratch)} of scratch after "
+        f"{count(scratch.restricted_mean)}.{censored}"
     )
-
-
-def _seeds(reach: ReachTimes, n_seeds: int) -> str:
-    """Format as in `3 of 5 seeds`."""
-    return f"{round(reach.fraction * n_seeds)} of {n_seeds} seeds"
 
 
 GOOD: Final = 0.9
@@ -162,10 +151,9 @@ def arm_rows(study: Study) -> tuple[ArmRow, ...]:
 
 def successes(study: Study, kind: str) -> NDArray[np.float64]:
     """Success rate of each run at the end, shape (n_seeds,); (0,) if unknown."""
-    ends = [[e.success for e in _end(study, result)] for result in study.of(kind)]
-    if any(share is None for end in ends for share in end):
+    if any(e.success is None for result in study.of(kind) for e in _end(study, result)):
         return np.empty(0)
-    return np.array([float(np.mean(np.array(end, np.float64))) for end in ends])
+    return _means(study, kind, lambda e: e.success or 0.0)
 
 
 def weak_individuals(study: Study) -> list[str]:
@@ -190,8 +178,18 @@ def weak_individuals(study: Study) -> list[str]:
 
 def finals(study: Study, kind: str) -> NDArray[np.float64]:
     """Final value of each run, shape (n_seeds,)."""
+    return _means(study, kind, partial(_value, study))
+
+
+def _means(study: Study, kind: str, of: Callable[[Evaluation], float]) -> NDArray[np.float64]:
+    """Mean of a number over the last evaluations of each run, shape (n_seeds,)."""
     ends = (_end(study, result) for result in study.of(kind))
-    return np.array([float(np.mean([_value(study, e) for e in end])) for end in ends])
+    return np.array([float(np.mean([of(evaluation) for evaluation in end])) for end in ends])
+
+
+def _end(study: Study, result: RunResult) -> tuple[Evaluation, ...]:
+    """The last evaluations of a run, which are averaged."""
+    return result.curve[-1 if result.run.kind == SOURCE else -study.plan.last_k :]
 
 
 def _value(study: Study, evaluation: Evaluation) -> float:
@@ -203,18 +201,19 @@ def _value(study: Study, evaluation: Evaluation) -> float:
 
 
 def _row(study: Study, kind: str) -> ArmRow:
-    results = study.of(kind)
+    results, at_the_end = study.of(kind), finals(study, kind)
     ends = [evaluation for result in results for evaluation in _end(study, result)]
-    at_the_end = finals(study, kind)
     terms = {name: None for evaluation in ends for name in evaluation.terms}
+
+    def spread(values: NDArray[np.float64]) -> str:
+        return "not reported" if np.isnan(values).any() else spread_text(values)
+
     return ArmRow(
         kind=kind,
         seeds=len(results),
-        first=_spread(np.array([_value(study, r.curve[0]) for r in results])),
-        final=_spread(at_the_end),
-        final_return=spread_text(
-            np.array([float(np.mean([e.mean_return for e in _end(study, r)])) for r in results])
-        ),
+        first=spread(np.array([_value(study, r.curve[0]) for r in results])),
+        final=spread(at_the_end),
+        final_return=spread_text(_means(study, kind, lambda e: e.mean_return)),
         length=number(float(np.mean([e.mean_length for e in ends]))),
         success=share_text(successes(study, kind)),
         good=_good(study, kind),
@@ -224,19 +223,9 @@ def _row(study: Study, kind: str) -> ArmRow:
     )
 
 
-def _spread(values: NDArray[np.float64]) -> str:
-    """Format values with their t-interval."""
-    return "not reported" if np.isnan(values).any() else spread_text(values)
-
-
-def _end(study: Study, result: RunResult) -> tuple[Evaluation, ...]:
-    """The last evaluations of a run, which are averaged."""
-    return result.curve[-1 if result.run.kind == "source" else -study.plan.last_k :]
-
-
 def _good(study: Study, kind: str) -> str:
     """Number of runs that ever came close to the best one, as in `4 of 5`."""
-    if kind == "source":
+    if kind == SOURCE:
         return ""
     floor = next(iter(study.summaries.values())).reference.zero
     best = max(float(finals(study, arm).max()) for arm in study.plan.arms)
