@@ -71,6 +71,13 @@ def pendulum_action(gain: float = 100.0, unit: str = "N", name: str = "slide") -
     return Layout((motor(name, gain, unit),))
 
 
+def carts(source: Layout, target: Layout, **options: Any) -> BodyMap:
+    """Return the map between two carts with a pole that differ in their actions."""
+    return BodyMap.between(
+        pendulum_observation(), pendulum_observation(), source, target, **options
+    )
+
+
 def grown(**options: Any) -> BodyMap:
     """Return the map from the ant to the ant with feet."""
     return BodyMap.between(*GROWN, **options)

@@ -1,4 +1,4 @@
-"""Computation, printing and validation of body maps."""
+"""Computation, printing, validation, composition and inversion of body maps."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from shapechanger.errors import MapError, SpaceMismatch, UnknownName
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, MapEntry, MapRow, Zero
 from tests.transfer.body_map.bodies import (
+    carts,
     grown,
     motor,
     pendulum_action,
+    pendulum_observation,
 )
 
 
@@ -41,25 +43,17 @@ def test_values_are_reordered_by_name() -> None:
     np.testing.assert_array_equal(small().adapt_action([0.4, 0.3]), [0.3, -0.6, 0.0, 0.2])
 
 
-def test_actions_are_clipped_to_the_target() -> None:
-    np.testing.assert_array_equal(small().adapt_action([3.0, -0.7]), [-0.7, 1.0, 0.0, 1.0])
-
-
-def test_batches_of_any_shape_are_accepted() -> None:
-    values = np.random.default_rng(0).normal(size=(4, 5, 2))
-    adapted = small().adapt_observation(values)
-    assert adapted.shape == (4, 5, 3)
-    np.testing.assert_array_equal(adapted[2, 3], small().adapt_observation(values[2, 3]))
-    assert small().adapt_observation(np.zeros((0, 2))).shape == (0, 3)
-
-
 @pytest.mark.parametrize(
     ("given", "result"),
     [(np.float32, np.float32), (np.float64, np.float64), (np.int64, np.float64)],
 )
-def test_the_dtype_is_kept(given: type, result: type) -> None:
-    assert small().adapt_observation(np.ones(2, given)).dtype == result
-    assert small().adapt_action(np.ones(2, given)).dtype == result
+def test_batches_of_any_shape_and_type_are_accepted(given: type, result: type) -> None:
+    values = np.random.default_rng(0).uniform(-9, 9, size=(4, 5, 2)).astype(given)
+    adapted = small().adapt_observation(values)
+    assert (adapted.shape, adapted.dtype) == ((4, 5, 3), result)
+    np.testing.assert_array_equal(adapted[2, 3], small().adapt_observation(values[2, 3]))
+    assert small().adapt_observation(np.zeros((0, 2), given)).shape == (0, 3)
+    assert small().adapt_action(values).dtype == result
 
 
 def test_blocks_keep_their_order() -> None:
@@ -120,6 +114,8 @@ def test_the_short_form_counts_the_rules() -> None:
     assert repr(small()) == (
         "BodyMap(observation: 1 Copy, 1 Zero, 1 Hold; action: 3 Copy, 1 Learn)"
     )
+    nothing = Layout(())
+    assert repr(BodyMap.identity(nothing, nothing)) == "BodyMap(observation: none; action: none)"
 
 
 def test_each_feature_needs_its_rule_in_order() -> None:
@@ -135,10 +131,9 @@ def test_each_feature_needs_its_rule_in_order() -> None:
 
 
 def test_entries_are_equal_if_they_do_the_same() -> None:
-    assert MapEntry("a", Zero(), "default") == MapEntry("a", Zero(), "rule 'a'")
-    assert hash(MapEntry("a", Zero(), "default")) == hash(MapEntry("a", Zero(), "rule 'a'"))
-    assert MapEntry("a", Zero()) != MapEntry("a", Learn())
-    assert not MapEntry("a", Zero(), "default") != MapEntry("a", Zero(), "rule 'a'")  # noqa: SIM202
+    one, same = MapEntry("a", Zero(), "default"), MapEntry("a", Zero(), "rule 'a'")
+    assert one == same != MapEntry("a", Learn())
+    assert hash(one) == hash(same)
 
 
 def test_a_map_can_be_pickled() -> None:
@@ -163,11 +158,93 @@ def test_actions_are_clipped_at_both_ends() -> None:
         np.testing.assert_array_equal(moved, np.full(12, end, np.float32))
 
 
-def test_a_map_counts_its_rules() -> None:
-    nothing = Layout(())
-    assert repr(BodyMap.identity(nothing, nothing)) == "BodyMap(observation: none; action: none)"
-
-
 def test_an_inverse_keeps_the_origin_of_its_rules() -> None:
     back = grown(rules={"foot_1/motor": Copy("ankle_1/motor")}).inverse()
     assert {row.why for row in back.table()} == {"same name", "default"}
+
+
+def copied() -> BodyMap:
+    """Return a map in which two target motors copy one source motor."""
+    return BodyMap.between(
+        Layout((Feature("z", "m"), Feature("height", "m"))),
+        Layout((Feature("z", "m"),)),
+        Layout((motor("ankle"),)),
+        Layout((motor("foot"), motor("ankle"), motor("toe"))),
+        rules={
+            "height": "copy z",
+            "foot/motor": "copy ankle/motor",
+            "toe/motor": Copy("ankle/motor", -0.5),
+        },
+    )
+
+
+def test_composition_multiplies_scales_and_joins_reasons() -> None:
+    """Scales multiply, and `why` names the rule of each map."""
+    motors = pendulum_action()
+    first = BodyMap.between(
+        pendulum_observation("pole"),
+        pendulum_observation(),
+        motors,
+        motors,
+        rules={"pole/*": "copy hinge/*"},
+    )
+    second = BodyMap.between(
+        pendulum_observation(),
+        pendulum_observation(),
+        motors,
+        motors,
+        rules={
+            "hinge/angle": Copy("hinge/angle", -2.0),
+            "hinge/velocity": Hold(3.0),
+            "slider/velocity": "zero",
+        },
+    )
+    both = first.then(second)
+    assert [entry.rule for entry in both.observation] == [
+        Copy("slider/position"),
+        Copy("hinge/angle", -2.0),
+        Zero(),
+        Hold(3.0),
+    ]
+    assert both.observation[0].why == "same name"
+    assert both.observation[1].why == "rule 'pole/*', then rule 'hinge/angle'"
+
+
+@pytest.mark.parametrize(
+    ("middle", "message"),
+    [
+        (Layout((Feature("z", "mm"), Feature("y", "m"))), r"z \[m\] and z \[mm\], whose unit"),
+        (Layout((Feature("y", "m"), Feature("z", "m"))), "whose name is 'z' and 'y'"),
+        (Layout((Feature("z", "m"),)), "one has 2 features and the other 1"),
+    ],
+)
+def test_maps_of_different_middle_bodies_are_refused(middle: Layout, message: str) -> None:
+    here = Layout((Feature("z", "m"), Feature("y", "m")))
+    first = BodyMap.identity(here, pendulum_action())
+    second = BodyMap.identity(middle, pendulum_action())
+    with pytest.raises(MapError, match=message) as caught:
+        first.then(second)
+    assert "target observation of the first" in str(caught.value)
+    gains = (BodyMap.identity(here, pendulum_action(gain)) for gain in (100.0, 200.0))
+    first, second = gains
+    with pytest.raises(MapError, match=r"action of the first .* gain is 100\.0 and 200\.0"):
+        first.then(second)
+
+
+def test_the_inverse_prefers_the_copy_of_the_same_name() -> None:
+    """Several copies without one of the same name have no unique inverse."""
+    back = copied().inverse()
+    assert [entry.rule for entry in back.action] == [Copy("ankle/motor")]
+    assert [entry.rule for entry in back.observation] == [Copy("z")]
+    feet = Layout((motor("foot"), motor("toe")))
+    there = carts(Layout((motor("ankle"),)), feet, rules={"*/motor": "copy ankle/motor"})
+    with pytest.raises(MapError, match="is copied to 'foot/motor' and 'toe/motor', none"):
+        there.inverse()
+
+
+def test_the_inverse_uses_otherwise() -> None:
+    for otherwise, rule in (("learn", Learn()), ("zero", Zero())):
+        rules = {e.feature: e.rule for e in grown().inverse(otherwise).observation}
+        assert rules["foot_1/velocity"] == rule
+    with pytest.raises(MapError, match=r"'foot_1/angle' cannot hold 0\.1: it reaches from 0\.52"):
+        grown().inverse(Hold(0.1))

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import gymnasium as gym
 import numpy as np
 import pytest
 
+import shapechanger  # noqa: F401 - registers the ids.
 from shapechanger.errors import MapError, UnknownName
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy
@@ -84,58 +88,40 @@ def test_the_mirror_of_either_body_gives_the_same_map() -> None:
     assert whys == {"same name", "symmetry"}
 
 
-def test_only_similar_features_can_swap() -> None:
-    """Partners exist, and have one unit, shape and gain."""
-    mixed = Layout((Feature("a", "m"), Feature("b", "rad"), Feature("c/x", "m")))
-    motors = pendulum_action()
-    with pytest.raises(MapError, match="their unit is 'm' and 'rad'"):
-        BodyMap.mirror(mixed, motors, swap={"a": "b"})
-    with pytest.raises(UnknownName, match="No feature matches 'c'"):
-        BodyMap.mirror(mixed, motors, swap={"c": "a"})
-
-
-def test_a_body_whose_ranges_differ_is_not_symmetric() -> None:
-    """Features whose ranges are not mirror images cannot swap."""
-    with pytest.raises(MapError, match=r"'ankle_1/angle' reaches from 0.52.* no such symmetry"):
-        BodyMap.mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=["hip_*", "ankle_*"])
+MIXED = Layout((Feature("a", "m"), Feature("b", "rad"), Feature("c/x", "m")))
 
 
 @pytest.mark.parametrize(
-    ("swap", "flip", "message"),
+    ("layout", "swap", "flip", "kind", "message"),
     [
-        ({"hip_1": "hip_9"}, [], "No element matches 'hip_9'"),
-        ({"leg_*": "hip_*"}, [], r"No element matches 'leg_\*'"),
-        ({"hip_1": "hip_4"}, ["hop_*"], r"No element matches 'hop_\*'"),
-    ],
-)
-def test_unknown_elements_are_refused(swap: dict[str, str], flip: list[str], message: str) -> None:
-    with pytest.raises(UnknownName, match=message):
-        BodyMap.mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
-
-
-@pytest.mark.parametrize(
-    ("swap", "flip", "message"),
-    [
+        (MIXED, {"a": "b"}, [], MapError, "their unit is 'm' and 'rad'"),
+        (MIXED, {"c": "a"}, [], UnknownName, "No feature matches 'c'"),
+        (None, ANT_SWAP, ["hip_*", "ankle_*"], MapError, "'ankle_1/angle' reaches from 0.52.* sym"),
+        (None, {"hip_1": "hip_9"}, [], UnknownName, "No element matches 'hip_9'"),
+        (None, {"leg_*": "hip_*"}, [], UnknownName, r"No element matches 'leg_\*'"),
+        (None, {"hip_1": "hip_4"}, ["hop_*"], UnknownName, r"No element matches 'hop_\*'"),
         (
+            None,
             {"hip_1": "hip_4", "hip_2": "hip_4"},
             [],
+            MapError,
             "'hip_4' cannot mirror both 'hip_1' and 'hip_2'",
         ),
-        (ANT_SWAP, ["hip_1"], "flip both or neither"),
+        (None, ANT_SWAP, ["hip_1"], MapError, "flip both or neither"),
+        (Layout((Feature("eye", "1", shape=(2, 2)),)), {}, [], MapError, "'eye' is a block of num"),
     ],
 )
-def test_contradictory_mirrors_are_refused(
-    swap: dict[str, str], flip: list[str], message: str
+def test_what_is_no_symmetry_is_refused(
+    layout: Layout | None,
+    swap: dict[str, str],
+    flip: list[str],
+    kind: type[Exception],
+    message: str,
 ) -> None:
-    """Contradicting pairs, and pairs of which one element flips, are refused."""
-    with pytest.raises(MapError, match=message):
-        BodyMap.mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
-
-
-def test_blocks_have_no_mirror() -> None:
-    seeing = Layout((Feature("eye", "1", shape=(2, 2)),))
-    with pytest.raises(MapError, match="'eye' is a block of numbers"):
-        BodyMap.mirror(seeing, pendulum_action())
+    """Partners exist, have one unit, shape and gain, and ranges that are mirror images."""
+    action = ant_action() if layout is None else pendulum_action()
+    with pytest.raises(kind, match=message):
+        BodyMap.mirror(layout or ant_observation(), action, swap=swap, flip=flip)
 
 
 def test_paths_of_several_parts_are_kept() -> None:
@@ -170,3 +156,37 @@ def test_ranges_of_a_pair_agree_up_to_rounding(left: float, right: float, fits: 
     else:
         with pytest.raises(MapError, match="no such symmetry"):
             BodyMap.mirror(layout, motor, swap={"l": "r"})
+
+
+LEGS = {"front_left_leg": "right_back_leg", "front_right_leg": "back_leg"}
+
+
+@pytest.mark.parametrize("name", ["Ant", "BigAnt", "ExtendedAnt"])
+def test_the_mirror_is_a_symmetry_of_the_ant(name: str) -> None:
+    env = gym.make(f"shapechanger/{name}-v1")
+    ant: Any = env.unwrapped
+    layouts = ant.observation_layout, ant.action_layout
+    mirrored = BodyMap.mirror(*layouts, swap=ANT_SWAP | LEGS, flip=ANT_FLIP)
+    rng = np.random.default_rng(0)
+    n_position, n_velocity = ant.model.nq - 2, ant.model.nv  # x and y are not observed.
+    env.reset(seed=0)
+    touched = 0
+    for _ in range(30):
+        action = rng.uniform(-1.0, 1.0, env.action_space.shape or ()).astype(np.float32)
+        position, velocity = ant.data.qpos.copy(), ant.data.qvel.copy()
+        sensed = np.zeros(layouts[0].size)
+        sensed[: n_position + n_velocity] = [*position[2:], *velocity]
+        turned = mirrored.adapt_observation(sensed)
+        ant.set_state(
+            np.array([position[0], -position[1], *turned[:n_position]]),
+            turned[n_position : n_position + n_velocity],
+        )
+        ant.data.qacc_warmstart[:] = 0.0
+        seen_mirrored, *_ = env.step(mirrored.adapt_action(action))
+        ant.set_state(position, velocity)
+        ant.data.qacc_warmstart[:] = 0.0
+        seen, *_ = env.step(action)
+        touched += ant.data.ncon > 0
+        np.testing.assert_allclose(mirrored.adapt_observation(seen), seen_mirrored, atol=1e-6)
+    assert touched > 5
+    env.close()

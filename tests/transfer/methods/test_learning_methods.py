@@ -16,9 +16,9 @@ from shapechanger.errors import StudyError
 from shapechanger.policy import load_policy
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.methods import on_policy
+from shapechanger.transfer.methods import training
 from shapechanger.transfer.methods.basic import bodies_between, shuffle
-from shapechanger.transfer.methods.on_policy import MappedTeacher
+from shapechanger.transfer.methods.training import MappedTeacher
 from shapechanger.transfer.plan import Run, TransferTask
 from shapechanger.transfer.study import Study, run_study
 from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
@@ -74,11 +74,11 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
         TINY_NORMALISED, learning_rate=1e-2, n_steps=64, eval_every=512
     )
     plan = tiny_plan(settings, arms=("scratch", "kickstart"), steps=512, source_steps=512)
-    monkeypatch.setattr(on_policy, "_UNTIL", 1e9)  # Weights are kept.
+    monkeypatch.setattr(training, "_UNTIL", 1e9)  # Weights are kept.
     observations = np.random.default_rng(0).normal(0.0, 0.1, (200, 4))
     away: list[float] = []
     for weight in (0.0, 1.0):
-        monkeypatch.setattr(on_policy, "_WEIGHT", weight)
+        monkeypatch.setattr(training, "_WEIGHT", weight)
         out = tmp_path / f"weight-{weight:g}"
         run_study(plan, out, executor=Serial())
 

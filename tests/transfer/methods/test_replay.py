@@ -17,7 +17,7 @@ from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import OffPolicySettings
-from shapechanger.transfer.methods.replay import (
+from shapechanger.transfer.methods.training import (
     DomainClassifiers,
     Transitions,
     _mapped,  # pyright: ignore[reportPrivateUsage]

@@ -39,8 +39,8 @@ def body_map(
 class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstructorArgs):
     """Target env in which a policy of the source acts unchanged.
 
-    Observations and actions are the source body's, observations in float64. Rewards,
-    terminations and infos are the target's.
+    Observations and actions are the source body's, observations in float64, actions in float32,
+    with the ranges of their layouts. Rewards, terminations and infos are the target's.
 
     Attributes:
         body_map: Map between the two bodies.
@@ -49,42 +49,23 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
         env: The target env.
         body_map: Map between the bodies, or its JSON, so that Gymnasium can serialise the spec; it
             cannot serialise spaces.
-        observation_space: The source's, shape (source_observation.size,); by default a float64
-            box with the ranges of its layout.
-        action_space: The source's, shape (source_action.size,); by default a float32 box.
 
     Raises:
-        SpaceMismatch: If a space does not have the size of its layout.
+        SpaceMismatch: If a space of the target does not have the size of its layout.
     """
 
-    def __init__(
-        self,
-        env: gym.Env[Any, Any],
-        body_map: BodyMap | str,
-        *,
-        observation_space: Box | None = None,
-        action_space: Box | None = None,
-    ) -> None:
+    def __init__(self, env: gym.Env[Any, Any], body_map: BodyMap | str) -> None:
         built = BodyMap.from_json(body_map) if isinstance(body_map, str) else body_map
-        gym.utils.RecordConstructorArgs.__init__(
-            self,
-            body_map=built.to_json(),
-            observation_space=observation_space,
-            action_space=action_space,
-        )
+        gym.utils.RecordConstructorArgs.__init__(self, body_map=built.to_json())
         super().__init__(env)
         self.body_map = built
         check_size("target observation", env.observation_space, built.target_observation)
-        self._target_dtype = check_size(
-            "target action", env.action_space, built.target_action
-        ).dtype
+        moves = check_size("target action", env.action_space, built.target_action)
+        self._target_dtype = moves.dtype
         sensed, moved = built.source_observation, built.source_action
-        self.observation_space = observation_space or Box(sensed.low, sensed.high, dtype=np.float64)
-        self.action_space = action_space or Box(
-            moved.low.astype(np.float32), moved.high.astype(np.float32), dtype=np.float32
-        )
-        check_size("source observation", self.observation_space, built.source_observation)
-        check_size("source action", self.action_space, built.source_action)
+        self.observation_space = Box(sensed.low, sensed.high, dtype=np.float64)
+        low, high = moved.low.astype(np.float32), moved.high.astype(np.float32)
+        self.action_space = Box(low, high, dtype=np.float32)
 
     @property
     def observation_layout(self) -> Layout:

@@ -17,10 +17,10 @@ from shapechanger.transfer.body_map.matching import (
     Units,
     check_patterns,
     constant_rule,
+    mirrored_entries,
     read_toml,
     resolve,
 )
-from shapechanger.transfer.body_map.mirror import mirrored_entries
 from shapechanger.transfer.body_map.rules import (
     BY_DEFAULT,
     SAME_NAME,
@@ -54,15 +54,15 @@ def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tu
 
 def _invert_entries(half: Half, otherwise: RuleLike) -> tuple[MapEntry, ...]:
     """Return for each feature of `over` a rule over `into`, which recovers it from its copies."""
-    copies: dict[str, dict[str, tuple[float, str]]] = {}
-    for entry in half.entries:
-        if isinstance(entry.rule, Copy):
-            of_one = copies.setdefault(entry.rule.feature, {})
-            of_one[entry.feature] = entry.rule.scale, entry.why
     result: list[MapEntry] = []
     for feature in half.side.over:
-        name, takers = feature.name, copies.get(feature.name)
-        if takers is None:
+        name = feature.name
+        takers = {
+            entry.feature: (entry.rule.scale, entry.why)
+            for entry in half.entries
+            if isinstance(entry.rule, Copy) and entry.rule.feature == name
+        }
+        if not takers:
             result.append(MapEntry(name, constant_rule(otherwise, feature), BY_DEFAULT))
             continue
         if len(takers) > 1 and name not in takers:

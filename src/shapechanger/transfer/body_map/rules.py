@@ -114,7 +114,17 @@ def expand_template(template: str, pattern: str, name: str) -> str:
     """
     if "*" not in template:
         return template
-    fit = re.fullmatch("".join(map(_as_group, _TOKEN.findall(pattern))), name, re.DOTALL)
+
+    def as_group(token: str) -> str:
+        """Translate one token of a glob to a regular expression; a wildcard becomes a group."""
+        if token in ("*", "?"):
+            return "(.*)" if token == "*" else "(.)"
+        if len(token) > 1:
+            inside = token[1:-1].replace("\\", r"\\")
+            return f"([^{inside[1:]}])" if inside.startswith("!") else f"([{inside}])"
+        return re.escape(token)
+
+    fit = re.fullmatch("".join(map(as_group, _TOKEN.findall(pattern))), name, re.DOTALL)
     found = fit.groups() if fit else ()
     if len(found) != template.count("*"):
         raise MapError(
@@ -123,18 +133,6 @@ def expand_template(template: str, pattern: str, name: str) -> str:
         )
     literal = template.split("*")
     return "".join(a + b for a, b in zip(literal, (*found, ""), strict=True))
-
-
-def _as_group(token: str) -> str:
-    """Translate one token of a glob to a regular expression; a wildcard becomes a group."""
-    if token == "*":
-        return "(.*)"
-    if token == "?":
-        return "(.)"
-    if len(token) > 1:
-        inside = token[1:-1].replace("\\", r"\\")
-        return f"([^{inside[1:]}])" if inside.startswith("!") else f"([{inside}])"
-    return re.escape(token)
 
 
 SideName = Literal["observation", "action"]
@@ -170,14 +168,12 @@ class Side(NamedTuple):
     @property
     def into_kind(self) -> str:
         """Name of a feature of `into` in messages."""
-        owner = "source" if self.name == "observation" else "target"
-        return f"{owner} {self.name} feature"
+        return f"{'source' if self.name == 'observation' else 'target'} {self.name} feature"
 
     @property
     def over_kind(self) -> str:
         """Name of a feature of `over` in messages."""
-        owner = "target" if self.name == "observation" else "source"
-        return f"{owner} {self.name} feature"
+        return f"{'target' if self.name == 'observation' else 'source'} {self.name} feature"
 
     def copied(self, name: str) -> Feature:
         """Return the feature of `over` that a rule copies."""
@@ -228,9 +224,7 @@ class Half:
             )
         self.offset, self._n_over = np.zeros(side.into.size), side.over.size
         into, over = side.into.slices, side.over.slices
-        rows: list[int] = []
-        columns: list[int] = []
-        scale: list[float] = []
+        rows, columns, scale = list[int](), list[int](), list[float]()
         for entry in entries:
             place = into[entry.feature]
             match entry.rule:

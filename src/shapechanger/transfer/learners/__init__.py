@@ -131,10 +131,6 @@ class Learner(Generic[_Settings]):
         threads: Threads that step the envs, None for one per core; the result is the same. One by
             default: a study runs as many trainings at a time as there are cores.
         tensorboard: Folder of TensorBoard's logs; None for no logs.
-
-    Args:
-        name: See the attribute.
-        settings: See the attribute.
     """
 
     threads: int | None = 1

@@ -106,16 +106,16 @@ def evaluate(
     played: list[_Episode] = []
     for first in range(0, len(envs) if episodes is None else episodes, len(envs)):
         played += _play(act, envs, seed + first)
-    stood = [episode.stood for episode in played if episode.stood is not None]
-    reached = [episode.success for episode in played if episode.success is not None]
+    stood = [each.stood for each in played if each.stood is not None]
+    reached = [each.success for each in played if each.success is not None]
     return Evaluation(
         steps,
-        float(np.mean([episode.total for episode in played])),
-        float(np.mean([episode.length for episode in played])),
-        _means([episode.terms for episode in played]),
+        float(np.mean([each.total for each in played])),
+        float(np.mean([each.length for each in played])),
+        _means([each.terms for each in played]),
         float(np.mean(reached)) if reached else None,
-        _means([episode.measures for episode in played]),
-        sum(stood) / sum(episode.length for episode in played) if stood else None,
+        _means([each.measures for each in played]),
+        sum(stood) / sum(each.length for each in played) if stood else None,
     )
 
 
@@ -137,7 +137,6 @@ class _Episode:
     measures: dict[str, float] = field(default_factory=dict[str, float])
 
     def add(self, reward: float, info: Mapping[str, Any], measures: Sequence[Measure]) -> None:
-        """Add a step."""
         self.total += reward
         self.length += 1
         for name, value in info.items():
@@ -149,12 +148,9 @@ class _Episode:
         if "standing" in info:
             self.stood = (self.stood or 0) + bool(info["standing"])
         for measure in measures:
-            if measure.key not in info:
-                continue
-            value = float(info[measure.key])
-            if measure.over == "episode":
-                value += self.measures.get(measure.name, 0.0)
-            self.measures[measure.name] = value
+            if measure.key in info:
+                before = self.measures.get(measure.name, 0.0) if measure.over == "episode" else 0.0
+                self.measures[measure.name] = float(info[measure.key]) + before
 
     def end(self, measures: Sequence[Measure], limit: int | None) -> None:
         """Divide sums over the episode by the time limit in steps, or by its length if None."""
@@ -165,24 +161,17 @@ class _Episode:
 
 def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episode]:
     """Run one episode in each env in parallel."""
-    starts = [env.reset(seed=seed + i)[0] for i, env in enumerate(envs)]
-    observations = np.stack(starts)
-    episodes = [_Episode() for _ in envs]
-    alive = list(range(len(envs)))
+    observations = np.stack([env.reset(seed=seed + i)[0] for i, env in enumerate(envs)])
+    episodes, alive = [_Episode() for _ in envs], list(range(len(envs)))
     measures = [measure for measure in measures_of(envs[0]) if measure.key]
     limit = None if envs[0].spec is None else envs[0].spec.max_episode_steps
     while alive:
-        actions = act(observations[alive])
-        still: list[int] = []
-        for i, action in zip(alive, actions, strict=True):
-            observation, reward, terminated, truncated, info = envs[i].step(action)
-            observations[i] = observation
+        for i, action in zip([*alive], act(observations[alive]), strict=True):
+            observations[i], reward, terminated, truncated, info = envs[i].step(action)
             episodes[i].add(float(reward), info, measures)
-            if not (terminated or truncated):
-                still.append(i)
-            else:
+            if terminated or truncated:
                 episodes[i].end(measures, limit)
-        alive = still
+                alive.remove(i)
     return episodes
 
 

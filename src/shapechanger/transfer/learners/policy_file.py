@@ -146,11 +146,7 @@ def actor(
 
 
 def _mean_action(model: BaseAlgorithm) -> Act | None:
-    """Return PPO's mean action, equal to `predict`'s; None for other algorithms and networks.
-
-    `predict` also sets the mode of every layer and builds a distribution, which takes four times as
-    long as the network itself.
-    """
+    """Return PPO's mean action, a fourth of the time of an equal `predict`; None for others."""
     policy: Any = model.policy
     kinds: Any = (type(policy), type(policy.features_extractor), type(policy.action_space))
     if kinds != (ActorCriticPolicy, FlattenExtractor, gym.spaces.Box):
@@ -259,11 +255,10 @@ def convert_zip(
         command: The command that converts it.
 
     Raises:
-        PolicyError: If the file is missing or no such zip.
-        PolicyError: If it is of another algorithm or policy class.
+        PolicyError: If the file is missing or no such zip, or of another algorithm.
         SpaceMismatch: If the layouts do not fit the policy's spaces.
     """
-    model = load_zip(path)
+    model = _read_zip(path)
     check_supported(model)
     observation, action = layouts
     check_size("observation of the policy", model.observation_space, observation)
@@ -273,7 +268,7 @@ def convert_zip(
         observation=observation,
         action=action,
         learner="converted",
-        settings=settings_of_model(model),
+        settings=_settings_of(model),
         steps=int(model.num_timesteps),
         seed=int(model.seed or 0),
         identity=identity,
@@ -282,8 +277,7 @@ def convert_zip(
     return TrainedPolicy(model, None, card)
 
 
-def load_zip(path: Path) -> Any:
-    """Load a model with the class of Stable-Baselines3 or sb3-contrib that wrote it."""
+def _read_zip(path: Path) -> Any:
     try:
         data: Any = load_from_zip_file(path, device="cpu")[0]
         # A2C has PPO's policy, and no clipping.
@@ -303,7 +297,7 @@ def load_zip(path: Path) -> Any:
     )
 
 
-def settings_of_model(model: Any) -> Sb3Settings:
+def _settings_of(model: Any) -> Sb3Settings:
     """Return the settings of a model, whose networks must be those that the settings describe."""
     on_policy = hasattr(model, "clip_range")
     activation = nn.Tanh if on_policy else nn.ReLU
@@ -316,28 +310,19 @@ def settings_of_model(model: Any) -> Sb3Settings:
             f"{model.policy.activation_fn.__name__}: both must be the same, with "
             f"{activation.__name__}."
         )
-    kind: type[PpoSettings | OffPolicySettings]
+    kind: type[PpoSettings | OffPolicySettings] = PpoSettings if on_policy else OffPolicySettings
+    kept = {n: getattr(model, n) for n in kind.__struct_fields__ if hasattr(model, n)}
+    kept |= {"learning_rate": float(model.lr_schedule(1.0)), "algorithm": type(model).__name__}
     if on_policy:
-        kind, update = PpoSettings, model.n_envs * model.n_steps
-        same = ("n_envs", "n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "ent_coef")
-        own: dict[str, Any] = {"clip_range": float(model.clip_range(1.0))}
+        kept["clip_range"], per_env = float(model.clip_range(1.0)), model.n_steps
     else:
-        frequency, unit = model.train_freq
+        kept["train_freq"], unit = model.train_freq
         if unit.value != "step":
             raise PolicyError("This model updates after episodes: only updates after steps fit.")
-        kind, update = OffPolicySettings, model.n_envs * frequency
-        same = ("n_envs", "batch_size", "buffer_size", "learning_starts", "gradient_steps", "gamma")
-        same = (*same, "tau", "ent_coef")
-        own = {"algorithm": type(model).__name__, "train_freq": frequency}
-    settings = kind(
-        **{name: getattr(model, name) for name in same},
-        **own,
-        learning_rate=float(model.lr_schedule(1.0)),
-        net_arch=tuple(actor),
-        steps=max(int(model.num_timesteps), update),
-        eval_every=update,
-        eval_episodes=5,
-    )
+        per_env = kept["train_freq"]
+    update = model.n_envs * per_env
+    steps = max(int(model.num_timesteps), update)
+    settings = kind(**kept, net_arch=tuple(actor), steps=steps, eval_every=update)
     spaces = SpacesOnly(model.observation_space, model.action_space)
     built = build_model(settings, DummyVecEnv([lambda: spaces] * model.n_envs), 0).policy
     shapes = {name: weight.shape for name, weight in model.policy.state_dict().items()}

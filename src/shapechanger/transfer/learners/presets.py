@@ -30,23 +30,18 @@ class _Presets(Mapping[str, LearnerSettings]):
     """Shipped settings, keyed by name; each is read when it is asked for."""
 
     def __getitem__(self, name: str) -> LearnerSettings:
-        return _preset(name)
+        table = _tables()[name]
+        # Missing values come from the preset named by `like`.
+        while like := table.get("like"):
+            table = {**_tables()[like], **{n: v for n, v in table.items() if n != "like"}}
+        values = {key: value for key, value in table.items() if key not in _ABOUT}
+        return _converted(name, KINDS.load(table["kind"]), values)
 
     def __iter__(self) -> Iterator[str]:
         return iter(_tables())
 
     def __len__(self) -> int:
         return len(_tables())
-
-
-@cache
-def _preset(name: str) -> LearnerSettings:
-    table = _tables()[name]
-    # Missing values come from the preset named by `like`.
-    while like := table.get("like"):
-        table = {**_tables()[like], **{n: v for n, v in table.items() if n != "like"}}
-    values = {key: value for key, value in table.items() if key not in _ABOUT}
-    return _converted(name, KINDS.load(table["kind"]), values)
 
 
 LEARNERS: Final[Mapping[str, LearnerSettings]] = _Presets()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -12,12 +13,7 @@ import gymnasium as gym
 import msgspec
 import numpy as np
 
-from shapechanger.contract.env_ref import (
-    EnvRef,
-    EnvTraits,
-    is_single_instance,
-    layouts_of,
-)
+from shapechanger.contract.env_ref import EnvRef, EnvTraits, is_single_instance, layouts_of
 from shapechanger.errors import MissingExtra, PolicyError, StudyError
 from shapechanger.policy import PolicyCard, load_policy
 from shapechanger.transfer.actions import require_ranges
@@ -26,11 +22,7 @@ from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import identities_in
 from shapechanger.transfer.learners import Learner, ignore
 from shapechanger.transfer.learners.algorithms import build_model
-from shapechanger.transfer.learners.evaluation import (
-    Evaluation,
-    evaluate,
-    evaluation_seed,
-)
+from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_seed
 from shapechanger.transfer.learners.policy_file import Normalisation, TrainedPolicy, actor
 from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.learners.vec_env import training_vec_env, with_scaled_actions
@@ -108,7 +100,10 @@ class Sb3Learner(Learner[Sb3Settings]):
             )
             together = DummyVecEnv([lambda: one]) if is_single else self._training_envs(env, one)
             stack.callback(together.close)
-            envs = self._with_statistics(VecMonitor(with_scaled_actions(together, action, env.id)))
+            envs = VecMonitor(with_scaled_actions(together, action, env.id))
+            if settings.normalise:
+                gamma = settings.model_arguments.get("gamma", 0.99)
+                envs = VecNormalize(envs, norm_obs=self._normalises_observations, gamma=gamma)
             model, explores = self._first_model(envs, card, start, body_map)
             episodes = settings.eval_episodes
             first_seed = evaluation_seed(env, episodes)
@@ -128,7 +123,7 @@ class Sb3Learner(Learner[Sb3Settings]):
             callbacks: list[BaseCallback] = [] if callback is None else [callback]
             if start is not None and "off-policy" in settings.takes:
                 callbacks.append(_ActFirst(cast("Any", model).learning_starts))
-            progress = Progress(evaluate_now, every, on_steps, restarts=is_single)
+            progress = Progress(evaluate_now, every, on_steps, is_single)
             self._learn(env, model, envs, settings.whole_updates(steps), callbacks, progress)
             evaluate_now()
             card = msgspec.structs.replace(
@@ -155,13 +150,12 @@ class Sb3Learner(Learner[Sb3Settings]):
 
     def evaluate(self, env: EnvRef, policy: TrainedPolicy, body_map: BodyMap) -> Evaluation:
         """Evaluate a policy through the body map."""
-        envs = self._adapted(self.evaluation_envs(env), policy, body_map)
-        try:
-            episodes = self.settings.eval_episodes
-            return evaluate(policy.act, envs, evaluation_seed(env, episodes), episodes=episodes)
-        finally:
+        episodes = self.settings.eval_episodes
+        with ExitStack() as stack:
+            envs = self._adapted(self.evaluation_envs(env), policy, body_map)
             for one in envs:
-                one.close()
+                stack.callback(one.close)
+            return evaluate(policy.act, envs, evaluation_seed(env, episodes), episodes=episodes)
 
     def load(self, path: Path) -> TrainedPolicy:
         """Load a policy."""
@@ -196,13 +190,6 @@ class Sb3Learner(Learner[Sb3Settings]):
         del policy
         return [MappedEnv(one, body_map) for one in envs]
 
-    def _with_statistics(self, envs: VecEnv) -> VecEnv:
-        """Return envs that keep the statistics of a learner that normalises."""
-        if not self.settings.normalise:
-            return envs
-        gamma = self.settings.model_arguments.get("gamma", 0.99)
-        return VecNormalize(envs, norm_obs=self._normalises_observations, gamma=gamma)
-
     _normalises_observations = True
 
     def _first_model(
@@ -235,9 +222,8 @@ class Sb3Learner(Learner[Sb3Settings]):
         logs: str | None,
     ) -> BaseAlgorithm:
         """The source policy in the target's shapes, with its statistics, ready for training."""
-        arguments = dict(settings.model_arguments)
+        arguments, statistics = dict(settings.model_arguments), source.normalisation
         arguments.pop("policy_kwargs", None)
-        statistics = source.normalisation
         return transplant(
             source.model,
             body_map,
@@ -304,6 +290,7 @@ class _ActFirst(BaseCallback):
         return True
 
 
+@dataclass(eq=False)
 class Progress(BaseCallback):
     """Counts steps, and evaluates between updates, when the policy reflects all steps so far.
 
@@ -311,26 +298,17 @@ class Progress(BaseCallback):
         evaluate_now: Evaluates and reports the present policy.
         every: Steps between two evaluations.
         on_steps: Called with the number of steps done.
-
-    Args:
-        evaluate_now: See the attribute.
-        every: See the attribute.
-        on_steps: See the attribute.
         restarts: Whether an evaluation uses the training env, which then starts again.
     """
 
-    def __init__(
-        self,
-        evaluate_now: Callable[[], Evaluation],
-        every: float,
-        on_steps: OnSteps,
-        *,
-        restarts: bool,
-    ) -> None:
+    evaluate_now: Callable[[], Evaluation]
+    every: float
+    on_steps: OnSteps
+    restarts: bool
+
+    def __post_init__(self) -> None:
         super().__init__()
-        self.evaluate_now, self.every, self.on_steps = evaluate_now, every, on_steps
-        self._restarts = restarts
-        self._next = every
+        self._next = self.every
 
     def _on_step(self) -> bool:
         self.on_steps(self.num_timesteps)
@@ -346,7 +324,7 @@ class Progress(BaseCallback):
             means["standing"] = found.standing
         for name, value in means.items():
             self.logger.record(f"eval/{name}", value)
-        if self._restarts:
+        if self.restarts:
             model = cast("Any", self.model)
             model._last_obs = self.training_env.reset()
             model._last_episode_starts = np.ones((self.training_env.num_envs,), bool)

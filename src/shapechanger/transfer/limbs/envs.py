@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing
-from typing import Any, NamedTuple, cast
+from contextlib import ExitStack, closing
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -105,15 +105,6 @@ def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
     return limbs
 
 
-class _Group(NamedTuple):
-    """Envs whose bodies have equal spaces."""
-
-    numbers: list[int]
-    each: list[LimbRows]
-    rows: LimbRows
-    envs: Any  # Stable-Baselines3 leaves out types.
-
-
 class LimbVecEnv(DummyVecEnv):
     """Many envs of different bodies, also with different numbers of limbs, as rows.
 
@@ -138,32 +129,30 @@ class LimbVecEnv(DummyVecEnv):
         groups: dict[tuple[tuple[str, ...], ...], list[int]] = {}
         for i, rows in enumerate(own):
             groups.setdefault(rows.names, []).append(i)
-        self._groups: list[_Group] = []
-        self.envs: list[Any] = [None] * num_envs
+        # The numbers of the envs of each group, their rows, and the envs.
+        self._groups: list[tuple[list[int], LimbRows, Any]] = []
+        self._own, self.envs = own, cast("list[Any]", [None] * num_envs)
         for numbers in groups.values():
-            each = [own[i] for i in numbers]
-            envs: Any = training_vec_env(
-                together([bodies[i] for i in numbers]), len(numbers), threads
-            )
-            self._groups.append(_Group(numbers, each, LimbRows.stacked(each), envs))
+            bodies_here = together([bodies[i] for i in numbers])
+            envs: Any = training_vec_env(bodies_here, len(numbers), threads)
+            self._groups.append((numbers, LimbRows.stacked([own[i] for i in numbers]), envs))
             for i, one in zip(numbers, envs.envs, strict=True):
                 self.envs[i] = one
         # Skips DummyVecEnv's, which would make its own envs and buffers.
         cast("Any", VecEnv).__init__(self, num_envs, *limb_spaces(own[0]))
-        self._size = own[0].constant.size
         self._actions = np.zeros((num_envs, own[0].room), np.float32)
 
     def reset(self) -> NDArray[np.float32]:
         """Start an episode in each env with the seeds that were set."""
-        rows = np.empty((self.num_envs, self._size), np.float32)
-        for group in self._groups:
-            group.envs._seeds = [self._seeds[i] for i in group.numbers]
-            rows[group.numbers] = group.rows.of(group.envs.reset())
-            for i, info in zip(group.numbers, group.envs.reset_infos, strict=True):
+        seen = np.empty((self.num_envs, self._own[0].constant.size), np.float32)
+        for numbers, rows, envs in self._groups:
+            envs._seeds = [self._seeds[i] for i in numbers]
+            seen[numbers] = rows.of(envs.reset())
+            for i, info in zip(numbers, envs.reset_infos, strict=True):
                 self.reset_infos[i] = info
         self._reset_seeds()
         self._reset_options()
-        return rows
+        return seen
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions for `step_wait`; shape (envs, room)."""
@@ -173,26 +162,23 @@ class LimbVecEnv(DummyVecEnv):
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Step each env; return rows, rewards, ends and infos."""
-        rows = np.empty((self.num_envs, self._size), np.float32)
-        rewards = np.empty(self.num_envs, np.float32)
-        ends = np.empty(self.num_envs, np.bool_)
+        seen = np.empty((self.num_envs, self._own[0].constant.size), np.float32)
+        rewards, ends = np.empty(self.num_envs, np.float32), np.empty(self.num_envs, np.bool_)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for group in self._groups:
-            given = zip(group.each, self._actions[group.numbers], strict=True)
-            actions = np.stack([one.actions(limbs) for one, limbs in given])
-            observed, paid, ended, told = group.envs.step(actions)
-            rows[group.numbers] = group.rows.of(observed)
-            rewards[group.numbers], ends[group.numbers] = paid, ended
-            for k, (i, info) in enumerate(zip(group.numbers, told, strict=True)):
+        for numbers, rows, envs in self._groups:
+            actions = np.stack([self._own[i].actions(self._actions[i]) for i in numbers])
+            observed, rewards[numbers], ends[numbers], told = envs.step(actions)
+            seen[numbers] = rows.of(observed)
+            for i, info in zip(numbers, told, strict=True):
                 infos[i] = info
                 if "terminal_observation" in info:
-                    info["terminal_observation"] = group.each[k].of(info["terminal_observation"])
-        return rows, rewards, ends, infos
+                    info["terminal_observation"] = self._own[i].of(info["terminal_observation"])
+        return seen, rewards, ends, infos
 
     def close(self) -> None:
         """Close all envs."""
-        for group in self._groups:
-            group.envs.close()
+        for _, _, envs in self._groups:
+            envs.close()
 
 
 def bodies_in_turn(
@@ -221,14 +207,14 @@ def together(bodies: Sequence[EnvRef]) -> EnvRef:
 
 def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:
     """Return the rows of the bodies of some envs, all with the same room."""
-    own: list[LimbRows] = []
-    for body in bodies:
-        with closing(body.make()) as made:
-            own.append(rows_of(made, room))
+    with ExitStack() as stack:
+        made = [stack.enter_context(closing(body.make())) for body in bodies]
+        trees: list[Any] = [getattr(one.unwrapped, "tree", None) for one in made]
+        room = room or max(len(tree.limbs) if tree else 0 for tree in trees)
+        own = [rows_of(one, room) for one in made]
     if others := [rows.columns for rows in own if rows.columns != own[0].columns]:
         raise StudyError(f"These bodies sense different things: {own[0].columns} and {others[0]}.")
-    room = max(rows.room for rows in own)
-    return [rows.with_room(room) for rows in own]
+    return own
 
 
 class LimbLearner(Sb3Learner):

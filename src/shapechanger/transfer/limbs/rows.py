@@ -45,6 +45,13 @@ class Columns(msgspec.Struct, frozen=True):
         """Numbers of a row; the shorter kind of row, of trunk or limbs, is padded with zeros."""
         return DESCRIBED + max(len(self.trunk), len(self.limb))
 
+    def names(self, *, trunk: bool) -> list[str]:
+        """Return the name of each number of a row."""
+        names = ["exists", "has a motor", *(self.trunk_numbers if trunk else self.limb_numbers)]
+        names += [f"number {k}" for k in range(len(names), DESCRIBED)]
+        names += self.trunk if trunk else self.limb
+        return names + [f"number {k}" for k in range(len(names), self.width)]
+
 
 @dataclass(frozen=True)
 class LimbRows:
@@ -106,23 +113,14 @@ class LimbRows:
         """Number of limbs with rows."""
         return len(self.constant) // self.columns.width - 1
 
-    def with_room(self, room: int) -> LimbRows:
-        """Return the same with rows for more limbs."""
-        more = (room - self.room) * self.columns.width
-        return replace(
-            self,
-            selection=np.pad(self.selection, ((0, 0), (0, more))),
-            constant=np.pad(self.constant, (0, more)),
-        )
-
     def layouts(self) -> tuple[Layout, Layout]:
         """Return the layouts of the rows, flattened, and of the limbs' actions."""
         names = ["trunk", *self.limbs]
         names += [f"no limb {i}" for i in range(len(self.limbs), self.room)]
         features: list[Feature] = []
         for i, name in enumerate(names):
-            own = _filled(self.columns, trunk=i == 0)
             element = Element("joint", name) if 0 < i <= len(self.limbs) else None
+            own = self.columns.names(trunk=i == 0)
             features += [Feature(f"{name}: {kind}", "1", element=element) for kind in own]
         actions = [Feature(f"{name}: action", "1", -1.0, 1.0) for name in names[1:]]
         return Layout(tuple(features)), Layout(tuple(actions))
@@ -153,9 +151,7 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     room = room or len(tree.limbs)
     limb_of = {limb.joint: i for i, limb in enumerate(tree.limbs)}
     limb_of_body = {body: i for i, limb in enumerate(tree.limbs) for body in limb.bodies}
-    found: list[tuple[int, str]] = []
-    for feature in observation.features:
-        found.append(_column(feature, limb_of, limb_of_body, tree.trunk))
+    found = [_column(each, limb_of, limb_of_body, tree.trunk) for each in observation.features]
     columns = Columns(
         tuple(dict.fromkeys(what for row, what in found if row == 0)),
         tuple(dict.fromkeys(what for row, what in found if row > 0)),
@@ -197,34 +193,22 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
 
 def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
     """Refuse a body with rows of another meaning than the rows that a policy has learned from."""
-    learned, own = _meanings(trained), _meanings(present)
+
+    def meanings(layout: Layout) -> tuple[str, ...]:
+        rows: dict[str, list[str]] = {}
+        for name in layout.names:
+            row, _, kind = name.partition(": ")
+            rows.setdefault(row, []).append(kind)
+        _, limb, *_ = rows.values()
+        return (*rows["trunk"], *limb)
+
+    learned, own = meanings(trained), meanings(present)
     if learned != own:
         strange = [name for name in own if name not in learned] or list(own)
         raise TransplantError(
             f"The policy has learned in bodies of another family than {env}: it has no "
             f"{strange[0]!r} among {', '.join(learned[:3])} and {len(learned) - 3} more."
         )
-
-
-def _meanings(layout: Layout) -> tuple[str, ...]:
-    """Return the features of a trunk and of a limb."""
-    rows: dict[str, list[str]] = {}
-    for name in layout.names:
-        row, _, kind = name.partition(": ")
-        rows.setdefault(row, []).append(kind)
-    _, limb, *_ = rows.values()
-    return (*rows["trunk"], *limb)
-
-
-def _filled(columns: Columns, *, trunk: bool) -> list[str]:
-    """Return the name of each number of a row."""
-    numbers, senses = (
-        (columns.trunk_numbers, columns.trunk) if trunk else (columns.limb_numbers, columns.limb)
-    )
-    names = ["exists", "has a motor", *numbers]
-    names += [f"number {k}" for k in range(len(names), DESCRIBED)]
-    names += senses
-    return names + [f"number {k}" for k in range(len(names), columns.width)]
 
 
 def _column(

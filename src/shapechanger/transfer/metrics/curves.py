@@ -67,10 +67,6 @@ class LearningCurves:
         object.__setattr__(self, "steps", steps)
         object.__setattr__(self, "returns", returns)
 
-    def __reduce__(self) -> tuple[type[LearningCurves], tuple[object, ...]]:
-        """Rebuild copies and pickles, because a pickled array loses its read-only flag."""
-        return type(self), (self.steps, self.returns, self.source_steps, self.floor)
-
     @property
     def n_seeds(self) -> int:
         """Number of training runs."""

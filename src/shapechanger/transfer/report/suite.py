@@ -100,7 +100,6 @@ def suite_html(
 
 
 def _verdict(studies: Mapping[str, Study]) -> str:
-    """Count the pairs on which transfer helped."""
     found = [direction(gain_over_scratch(study)) for study in studies.values()]
     flat = sum(is_flat(study) for study in studies.values())
     arm = next(iter(studies.values())).headline_arm
@@ -160,11 +159,18 @@ def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
     }
     gains = {pair: gain_over_scratch(study) for pair, (_, study) in pairs.items()}
     widest = max((abs(gain.value or 0.0) for gain in gains.values()), default=0.0) or 1.0
+
+    def colour(share: float) -> str:
+        """CSS colour of a gain, from -1 to 1."""
+        full = _HELPED if share >= 0.0 else _HURT
+        mixed = (round(255 + _STRONGEST * abs(share) * (part - 255)) for part in full)
+        return "#{:02x}{:02x}{:02x}".format(*mixed)
+
     cells = {
         pair: {
             "name": one,
             "gain": estimate_text(gains[pair], signed=True),
-            "colour": _colour((gains[pair].value or 0.0) / widest),
+            "colour": colour((gains[pair].value or 0.0) / widest),
             "ends": ", ".join(
                 f"{arm} {number(float(finals(study, arm).mean()), 2)}" for arm in study.plan.arms
             ),
@@ -174,28 +180,19 @@ def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
     return {"sources": sources, "targets": targets, "cells": cells}
 
 
-def _colour(share: float) -> str:
-    """CSS colour of a gain, from -1 to 1."""
-    full = _HELPED if share >= 0.0 else _HURT
-    strength = _STRONGEST * min(1.0, abs(share))
-    mixed = (round(255 + strength * (part - 255)) for part in full)
-    return "#{:02x}{:02x}{:02x}".format(*mixed)
-
-
 def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
     """Rows for each target and for all together: each arm's scores and chance to beat scratch."""
     by_target: dict[str, list[Study]] = {}
     for study in studies.values():
         by_target.setdefault(_name(study.plan.task.target), []).append(study)
-    ends = {target: _score_ends(some) for target, some in by_target.items()}
     rows: list[tuple[str, ...]] = []
-    for target, scores in ends.items():
-        rows += _method_rows(target, scores, len(by_target[target]))
-    if len(ends) > 1:
-        merged: dict[str, list[NDArray[np.float64]]] = {}
-        for scores in ends.values():
-            for arm, groups in scores.items():
-                merged.setdefault(arm, []).extend(groups)
+    merged: dict[str, list[NDArray[np.float64]]] = {}
+    for target, some in by_target.items():
+        scores = _score_ends(some)
+        rows += _method_rows(target, scores, len(some))
+        for arm, groups in scores.items():
+            merged.setdefault(arm, []).extend(groups)
+    if len(by_target) > 1:
         rows += _method_rows("all targets", merged, len(studies))
     return rows
 
@@ -229,28 +226,22 @@ def _method_rows(
     rows: list[tuple[str, ...]] = []
     for arm, groups in scores.items():
         rng = np.random.default_rng(0)
+        few = max(group.size for group in groups) < _LEAST_RUNS
+
+        def text(estimate: Estimate, few: bool = few) -> str:
+            # Equal resamples give no interval: every run may beat every run of scratch.
+            if few or estimate.low == estimate.high:
+                estimate = Estimate(estimate.value)
+            return estimate_text(estimate)
+
         better = "baseline"
         if arm != "scratch" and len(groups) == n_studies:
-            chance = probability_of_improvement(groups, scores["scratch"], rng=rng)
-            better = _pooled_text(chance, groups)
+            better = text(probability_of_improvement(groups, scores["scratch"], rng=rng))
         elif arm != "scratch":
             better = f"only in {len(groups)} of {n_studies} studies"
-        mean = _pooled_text(interquartile_mean(groups, rng=rng), groups)
-        runs = str(sum(group.size for group in groups))
-        rows.append((target, arm, runs, mean, better))
+        mean = text(interquartile_mean(groups, rng=rng))
+        rows.append((target, arm, str(sum(group.size for group in groups)), mean, better))
     return rows
-
-
-def _pooled_text(estimate: Estimate, groups: Sequence[NDArray[np.float64]]) -> str:
-    """Format an estimate, without an interval if resampling the runs cannot give one.
-
-    Resampling gives no interval with fewer than three runs in each study, or if all resamples are
-    equal, for example because every run beats every run of scratch.
-    """
-    few = max(group.size for group in groups) < _LEAST_RUNS
-    if few or estimate.low == estimate.high:
-        estimate = Estimate(estimate.value)
-    return estimate_text(estimate)
 
 
 def _settings(studies: Mapping[str, Study]) -> list[tuple[str, str]]:

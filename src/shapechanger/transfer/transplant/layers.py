@@ -156,11 +156,7 @@ def gaussian_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
     middle = body_map.action_matrix @ ours.middle + body_map.action_offset - theirs.middle
     scale = np.abs(matrix).sum(axis=1)
     log_scale = np.log(np.where(scale > 0.0, scale, 1.0))
-    fresh = _fresh(body_map)
-    return PolicyOutputs(
-        mean=OutputMap(matrix, middle / theirs.half, fresh),
-        log_std=OutputMap(_spread(matrix), log_scale, fresh),
-    )
+    return _outputs(body_map, matrix, middle / theirs.half, log_scale)
 
 
 def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> PolicyOutputs:
@@ -192,12 +188,8 @@ def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
                 "Map it with units='same', hold it, learn it, or use PPO."
             )
         signs[place, origin] = np.sign(ratio)
-    fresh = _fresh(body_map)
     bias = np.arctanh(np.clip(squashed, -_CLOSEST_TO_BOUND, _CLOSEST_TO_BOUND))
-    return PolicyOutputs(
-        mean=OutputMap(signs, bias, fresh),
-        log_std=OutputMap(_spread(signs), np.zeros(len(signs)), fresh),
-    )
+    return _outputs(body_map, signs, bias, np.zeros(len(signs)))
 
 
 def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) -> Affine:
@@ -226,19 +218,16 @@ def _names(layout: Layout) -> list[tuple[str, int]]:
     return [(feature.name, place) for feature in layout for place in range(feature.size)]
 
 
-def _fresh(body_map: BodyMap) -> NDArray[np.bool_]:
+def _outputs(body_map: BodyMap, matrix: Array, offset: Array, log_scale: Array) -> PolicyOutputs:
     fresh = np.zeros(body_map.target_action.size, dtype=np.bool_)
     places = body_map.target_action.slices
     for entry in body_map.action:
         fresh[places[entry.feature]] = isinstance(entry.rule, Learn)
-    return fresh
-
-
-def _spread(matrix: Array) -> Array:
-    """Weights of the source's log standard deviations for each action: its origin, or the mean."""
+    # An action has the log standard deviation of its origin, or without one the mean of all.
     taken = matrix != 0.0
     mean = np.full_like(matrix, 1.0 / matrix.shape[1])
-    return np.where(taken.any(axis=1, keepdims=True), taken.astype(np.float64), mean)
+    spread = np.where(taken.any(axis=1, keepdims=True), taken.astype(np.float64), mean)
+    return PolicyOutputs(OutputMap(matrix, offset, fresh), OutputMap(spread, log_scale, fresh))
 
 
 class BoundaryLayers(NamedTuple):
@@ -266,25 +255,23 @@ def move_parameters(
     trained, new = source.state_dict(), target.state_dict()
     moved = {name: tensor.detach().clone() for name, tensor in trained.items()}
 
-    def replace(name: str, values: Array) -> None:
-        moved[name] = torch.as_tensor(values).to(trained[name])
-
     for layer in dict.fromkeys((*boundary.inputs, *boundary.outputs)):
-        if layer in trained:  # A vector of parameters.
-            replace(layer, _biases(_array(trained, layer), boundary.outputs[layer], new, layer))
-            continue
         at_weight, at_bias = f"{layer}.weight", f"{layer}.bias"
-        weight, bias = _array(trained, at_weight), _array(trained, at_bias)
+        # Weights and biases of a layer, or a vector of parameters.
+        names = (layer,) if layer in trained else (at_weight, at_bias)
+        values = {name: _array(trained, name) for name in names}
         if layer in boundary.inputs:  # W (A x + e) + b, as a layer of x.
             matrix, offset = boundary.inputs[layer]
-            weight, bias = weight @ matrix, bias + weight @ offset
-        if layer in boundary.outputs:
-            output = boundary.outputs[layer]
-            fresh = output.fresh[:, np.newaxis]
-            weight = np.where(fresh, _array(new, at_weight), output.matrix @ weight)
-            bias = _biases(bias, output, new, at_bias)
-        replace(at_weight, weight)
-        replace(at_bias, bias)
+            values[at_bias] = values[at_bias] + values[at_weight] @ offset
+            values[at_weight] = values[at_weight] @ matrix
+        if layer in boundary.outputs:  # N W and N b + d, or the parameters of a new network.
+            matrix, offset, fresh = boundary.outputs[layer]
+            for name, given in values.items():
+                mapped = matrix @ given if name == at_weight else matrix @ given + offset
+                is_new = fresh[:, np.newaxis] if name == at_weight else fresh
+                values[name] = np.where(is_new, _array(new, name), mapped)
+        for name, result in values.items():
+            moved[name] = torch.as_tensor(result).to(trained[name])
     differing = [
         name
         for name in dict.fromkeys((*moved, *new))
@@ -296,11 +283,6 @@ def move_parameters(
             "only the first and the last layer of an MlpPolicy may depend on the body."
         )
     return moved
-
-
-def _biases(trained: Array, output: OutputMap, new: Mapping[str, torch.Tensor], name: str) -> Array:
-    """N b + d, or the biases of a new network."""
-    return np.where(output.fresh, _array(new, name), output.matrix @ trained + output.offset)
 
 
 def _array(parameters: Mapping[str, torch.Tensor], name: str) -> Array:

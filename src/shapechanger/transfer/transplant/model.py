@@ -91,8 +91,7 @@ def _is_squashed(model: BaseAlgorithm) -> bool:
 
 def check_supported(model: object) -> None:
     """Refuse a model whose weights cannot be transplanted."""
-    problem = _problem(model)
-    if problem:
+    if problem := _problem(model):
         raise TransplantError(
             f"{problem} Only models with the MlpPolicy of PPO, SAC or TQC can be transplanted, on "
             "flat observations and continuous actions, without gSDE."
@@ -118,10 +117,7 @@ def _problem(model: object) -> str:
         parts = (policy.actor, tqc.Actor), (policy.critic, tqc.Critic)
     else:
         ours = cast("ActorCriticPolicy", policy)
-        parts = (
-            (ours.mlp_extractor, MlpExtractor),
-            (ours.action_dist, DiagGaussianDistribution),
-        )
+        parts = (ours.mlp_extractor, MlpExtractor), (ours.action_dist, DiagGaussianDistribution)
     for part, expected in parts:
         if type(part) is not expected:
             return f"This policy has a {type(part).__name__} instead of a {expected.__name__}."
@@ -186,11 +182,8 @@ def transplant(
     outputs_of = squashed_outputs if squashed else gaussian_outputs
     outputs = outputs_of(body_map, source_space, target_space)
     model = _new_model(source_model, target_env, seed, device or source_model.device, settings)
-    sensed = _sensed(
-        body_map,
-        normalisation or source_model.get_vec_normalize_env(),
-        model.get_vec_normalize_env(),
-    )
+    known = normalisation or source_model.get_vec_normalize_env()
+    sensed = _sensed(body_map, known, model.get_vec_normalize_env())
     if squashed:
         judged = critic_actions(body_map, outputs, source_space)
         boundary = _squashed_boundary(source.policy, sensed, outputs, judged)
@@ -213,7 +206,9 @@ def _sensed(
     target: VecNormalize | None,
 ) -> Affine:
     """Map the target network's inputs to the source's; set the target's statistics."""
-    statistics = _statistics(source)
+    statistics = cast("RunningMeanStd | None", source)
+    if isinstance(source, VecNormalize):
+        statistics = cast("RunningMeanStd", source.obs_rms) if source.norm_obs else None
     normaliser = target if target is not None and target.norm_obs else None
     if normaliser is not None and normaliser.training and statistics is None:
         raise TransplantError(
@@ -226,26 +221,19 @@ def _sensed(
             target.ret_rms = source.ret_rms.copy()
         if statistics is not None:
             target.epsilon, target.clip_obs = source.epsilon, source.clip_obs
-    settings = source if isinstance(source, VecNormalize) else target
-    epsilon = settings.epsilon if settings is not None else EPSILON
-    clip = settings.clip_obs if settings is not None else CLIP
     before = Scaling.none(body_map.source_observation.size)
     after = Scaling.none(body_map.target_observation.size)
     if statistics is not None:
-        before = Scaling.of(statistics, epsilon, clip)
+        settings = source if isinstance(source, VecNormalize) else target
+        defaults = EPSILON, CLIP
+        constants = (settings.epsilon, settings.clip_obs) if settings is not None else defaults
+        before = Scaling.of(statistics, *constants)
         if normaliser is not None:
             normaliser.obs_rms = transplant_normalisation(statistics, body_map)  # pyright: ignore[reportAttributeAccessIssue]
     if normaliser is not None:
         gathered = cast("RunningMeanStd", normaliser.obs_rms)
         after = Scaling.of(gathered, normaliser.epsilon, normaliser.clip_obs)
     return observation_affine(body_map, before, after)
-
-
-def _statistics(source: RunningMeanStd | VecNormalize | None) -> RunningMeanStd | None:
-    """Statistics of the source's observations, if they were normalised."""
-    if isinstance(source, VecNormalize):
-        return cast("RunningMeanStd", source.obs_rms) if source.norm_obs else None
-    return source
 
 
 def _gaussian_boundary(
