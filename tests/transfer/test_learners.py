@@ -1,4 +1,4 @@
-"""Learners of Stable-Baselines3 besides PPO: SAC, TQC, named classes, and functions."""
+"""Learners of Stable-Baselines3: their settings, exploration, and a single env."""
 
 from __future__ import annotations
 
@@ -6,23 +6,42 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import msgspec
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import A2C, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import MlpPolicy
 
+import shapechanger  # noqa: F401 - registers the envs.
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import PolicyError, StudyError
+from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.policy import load_policy, save_policy
+from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.export import export_onnx
-from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners import ignore
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
-from shapechanger.transfer.learners.presets import resolve_learner
-from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.learners.settings import ImportedSettings, OffPolicySettings, Sb3Settings
-from tests.transfer.studies import BIG, SMALL, tiny_plan
+from shapechanger.transfer.learners.presets import (
+    LEARNERS,
+    learner_settings,
+    resolve_learner,
+    tuned_on,
+    tuning_text,
+)
+from shapechanger.transfer.learners.sb3 import START_LOG_STD, Sb3Learner
+from shapechanger.transfer.learners.settings import (
+    ImportedSettings,
+    OffPolicySettings,
+    PpoSettings,
+    Sb3Settings,
+)
+from tests.transfer.studies import BIG, SMALL, TINY, tiny_plan
 
 HERE = __name__
 
@@ -80,7 +99,7 @@ def _ignore(evaluation: Evaluation) -> None:
     del evaluation
 
 
-LEARNERS = ("sac", "tqc", "stable_baselines3:A2C", f"{HERE}:narrow_sac")
+EACH = ("sac", "tqc", "stable_baselines3:A2C", f"{HERE}:narrow_sac")
 
 
 def trained(learner: str, **options: Any) -> tuple[TrainedPolicy, list[Evaluation], Sb3Settings]:
@@ -93,7 +112,7 @@ def trained(learner: str, **options: Any) -> tuple[TrainedPolicy, list[Evaluatio
     return policy, curve, settings
 
 
-@pytest.mark.parametrize("learner", LEARNERS)
+@pytest.mark.parametrize("learner", EACH)
 def test_policies_round_trip(learner: str, tmp_path: Path) -> None:
     """Every learner is evaluated at the same steps, and its policy round trips."""
     policy, curve, settings = trained(learner)
@@ -136,7 +155,7 @@ def test_a_file_alone_imports_no_module(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.delitem(sys.modules, "own_a2c")
 
 
-@pytest.mark.parametrize("learner", LEARNERS[:3])
+@pytest.mark.parametrize("learner", EACH[:3])
 def test_a_transplanted_policy_acts_as_the_source(learner: str) -> None:
     """Before its first update it acts as the source, instead of at random."""
     policy, curve, settings = trained(learner)
@@ -167,7 +186,7 @@ def test_a_transplanted_policy_is_kept_until_updates_start() -> None:
     np.testing.assert_allclose(moved.act(observations), policy.act(observations), rtol=1e-5)
 
 
-@pytest.mark.parametrize("learner", LEARNERS[:3])
+@pytest.mark.parametrize("learner", EACH[:3])
 def test_an_exported_policy_acts_the_same(learner: str, tmp_path: Path) -> None:
     """ONNX Runtime computes the same actions to 1e-5."""
     policy, _, _ = trained(learner)
@@ -218,3 +237,150 @@ def test_a_function_that_builds_something_else_is_refused() -> None:
 def test_a_training_that_diverges_is_refused() -> None:
     with pytest.raises(StudyError, match="diverged after"):
         trained(f"{HERE}:Unstable")
+
+
+def test_some_settings_change_and_others_stay() -> None:
+    """Values are converted as from TOML: lists to tuples, integers to floats."""
+    _, changed = resolve_learner("ppo-run", {"net_arch": [32], "learning_rate": 1})
+    assert isinstance(changed, PpoSettings)
+    assert (changed.net_arch, changed.learning_rate) == ((32,), 1.0)
+    assert changed.n_steps == learner_settings("ppo-run").n_steps  # type: ignore[union-attr]
+    assert resolve_learner("ppo-run", {}) == ("ppo-run", learner_settings("ppo-run"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('preset = "sac"\n\nlearning_rat = 1e-3\n', "line 3: No setting of sac matches"),
+        ('preset = "sac"\ngamma = "much"\n', "line 2: The settings of sac are wrong"),
+        ('# sak\npreset = "sak"\n', "line 2: No learner matches 'sak'. Did you mean 'sac'?"),
+        ('preset = "sac"\nn_envs = 0\n', "mine.toml: The settings .* and one episode\\.$"),
+    ],
+)
+def test_a_wrong_file_has_a_line(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(StudyError, match=message):
+        resolve_learner(str(tmp_path / "mine.toml"), {})
+
+
+def test_every_learner_says_what_it_was_tuned_on() -> None:
+    """The envs exist, and the text states whether an env is one of them."""
+    for learner in LEARNERS:
+        for name in tuned_on(learner):
+            assert f"shapechanger/{name}-v1" in gym.registry
+    assert tuning_text("ppo-swim", "shapechanger/Swimmer-v1") == (
+        "The settings were tuned on Swimmer."
+    )
+    assert tuning_text("ppo-run", "shapechanger/Hopper-v1").endswith("not on Hopper.")
+    assert "It is not stated" in tuning_text("mine", "shapechanger/Ant-v1")
+
+
+_LONG = msgspec.structs.replace(TINY, n_steps=256, eval_every=512, steps=512)
+
+
+class _Actions(BaseCallback):
+    """Collects the actions of the first rollout, and what the mean would have been."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.noise = np.empty(0)
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        model: Any = self.model
+        seen = torch.as_tensor(model.rollout_buffer.observations.reshape(-1, 4))
+        with torch.no_grad():
+            mean = model.policy.get_distribution(seen).mode().numpy()
+        self.noise = model.rollout_buffer.actions.reshape(mean.shape) - mean
+
+
+def _source(log_std: float) -> TrainedPolicy:
+    """A policy whose actions have this standard deviation."""
+    policy = Sb3Learner("tiny", TINY).train(SMALL, 32, 0, on_evaluation=lambda _: None)
+    model: Any = policy.model
+    model.policy.log_std.data.fill_(log_std)
+    return policy
+
+
+def _tuned(source: TrainedPolicy, settings: Sb3Settings = _LONG) -> tuple[TrainedPolicy, Any]:
+    actions = _Actions()
+    body_map = BodyMap.between(
+        source.card.observation, source.card.observation, source.card.action, source.card.action
+    )
+    policy = Sb3Learner("tiny", settings).train(
+        BIG, 512, 0, start=source, body_map=body_map, callback=actions, on_evaluation=lambda _: None
+    )
+    return policy, actions.noise
+
+
+@pytest.mark.parametrize(
+    ("source", "start"), [(-4.0, START_LOG_STD), (-1.3, START_LOG_STD), (-0.3, -0.3)]
+)
+def test_fine_tuning_explores(source: float, start: float, tmp_path: Path) -> None:
+    """A collapsed deviation is raised to the stated one, a larger one kept; the card says so."""
+    policy, noise = _tuned(_source(source))
+    assert policy.card.start_log_std == (pytest.approx(start),)
+    assert noise.std() == pytest.approx(np.exp(start), rel=0.15)
+    save_policy(policy, tmp_path / "policy.safetensors")
+    assert load_policy(tmp_path / "policy.safetensors").card == policy.card
+
+
+def test_it_never_explores_more_than_a_new_policy() -> None:
+    """Where a learner starts with less, so does fine-tuning."""
+    policy, _ = _tuned(_source(-4.0), msgspec.structs.replace(_LONG, log_std_init=-2.0))
+    assert policy.card.start_log_std == (pytest.approx(-2.0),)
+
+
+def test_a_new_policy_has_no_such_start() -> None:
+    assert _source(-4.0).card.start_log_std is None
+
+
+def test_evaluations_that_nobody_reads_are_left_out() -> None:
+    learner = Sb3Learner("tiny", TINY)
+    steps: list[int] = []
+    seen = learner.train(SMALL, 96, 0, on_evaluation=lambda e: steps.append(e.steps))
+    unseen = learner.train(SMALL, 96, 0, on_evaluation=ignore)
+    assert steps == [0, 32, 64, 96]
+    weights: list[Any] = [policy.model.policy.state_dict() for policy in (seen, unseen)]
+    for name, tensor in weights[0].items():
+        assert torch.equal(tensor, weights[1][name]), name
+
+
+FINGER = EnvRef("shapechanger/Finger-v1")
+
+
+_STEPS = 100  # Steps of an episode.
+
+
+def test_training_and_evaluation_alternate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Training and evaluation share the env; each rollout starts an episode."""
+    called: dict[int, list[int | str | None]] = {}
+    reset, step = FingerReachEnv.reset, FingerReachEnv.step
+
+    def counted_reset(
+        self: FingerReachEnv, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> Any:
+        called.setdefault(id(self), []).append(seed)
+        return reset(self, seed=seed, options=options)
+
+    def counted_step(self: FingerReachEnv, action: Any) -> Any:
+        called[id(self)].append("step")
+        return step(self, action)
+
+    monkeypatch.setattr(FingerReachEnv, "reset", counted_reset)
+    monkeypatch.setattr(FingerReachEnv, "step", counted_step)
+    monkeypatch.setattr(FingerReachEnv, "side_by_side", False, raising=False)
+    curve: list[Evaluation] = []
+    policy = Sb3Learner("tiny", TINY).train(FINGER, 96, 0, on_evaluation=curve.append)
+    assert [evaluation.steps for evaluation in curve] == [0, 32, 64, 96]
+    assert policy.card.steps == 96
+    (calls,) = called.values()
+    # Last episodes of the evaluations; each but the last is followed by training.
+    ends = [i for i, call in enumerate(calls) if call == EVALUATION_SEED + TINY.eval_episodes - 1]
+    assert len(ends) == 4
+    for i in ends:
+        assert set(calls[i + 1 : i + 1 + _STEPS]) == {"step"}
+        assert calls[i + 1 + _STEPS :][:1] in ([], [None], [0])  # Never a step after the end.
+    assert calls[ends[-1] + 1 + _STEPS :] == []

@@ -220,13 +220,6 @@ def test_a_corrupt_file_is_named_and_nothing_is_lost(
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("here")
-    with pytest.raises(OutputError, match="Cannot write"):
-        run_study(tiny_plan(), tmp_path / "file" / "study", executor=Serial())
-    assert (tmp_path / "file").read_text() == "here"
-
-
 def test_a_full_disk_loses_nothing(
     finished: tuple[Study, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,16 +1,39 @@
-"""Loading named methods: shipped, installed and registered ones."""
+"""Methods: loading them by name, and their effects on training."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
+import msgspec
+import numpy as np
 import pytest
+import torch
 
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.errors import StudyError, UnknownName
+from shapechanger.policy import load_policy
 from shapechanger.registry import METHODS
-from shapechanger.transfer.methods import Method, load_method, register
-from shapechanger.transfer.plan import ARMS, Run
-from tests.transfer.studies import tiny_plan
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.presets import resolve_learner
+from shapechanger.transfer.learners.sb3 import Sb3Learner
+from shapechanger.transfer.learners.settings import OffPolicySettings
+from shapechanger.transfer.methods import Method, load_method, register, training
+from shapechanger.transfer.methods.basic import bodies_between, shuffle
+from shapechanger.transfer.methods.training import (
+    DomainClassifiers,
+    MappedTeacher,
+    Transitions,
+    _mapped,  # pyright: ignore[reportPrivateUsage]
+    collect,
+)
+from shapechanger.transfer.plan import ARMS, Run, TransferTask
+from shapechanger.transfer.study import Study, run_study
+from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
+from tests.transfer.test_learners import SHORT
 
 
 @pytest.fixture
@@ -79,3 +102,248 @@ def test_seeds_do_not_depend_on_other_arms() -> None:
     assert small.seed_of(Run("fine-tune", 1)) == large.seed_of(Run("fine-tune", 1))
     kinds = ("scratch", "fine-tune", "kickstart", "evolution", "a:b")
     assert len({small.seed_of(Run(kind, 0)) for kind in kinds}) == len(kinds)
+
+
+ANT, EXTENDED = EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1")
+_DEEP = msgspec.structs.replace(TINY_NORMALISED, net_arch=(8, 8))
+_LEARNING = ("fine-tune", "frozen-trunk", "kickstart", "evolution")
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
+    """A small study of the methods that learn on the target, and its folder."""
+    out = tmp_path_factory.mktemp("methods") / "study"
+    plan = tiny_plan(_DEEP, arms=("scratch", *_LEARNING), steps=128, source_steps=32)
+    return run_study(plan, out, executor=Serial()), out
+
+
+def _weights(study: tuple[Study, Path], kind: str) -> dict[str, Any]:
+    _, out = study
+    return dict(load_policy(Run(kind, 0).policy_file(out)).model.policy.state_dict())
+
+
+def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
+    made, _ = study
+    for kind in ("scratch", *_LEARNING):
+        assert [e.steps for e in made.of(kind)[0].curve] == [0, 32, 64, 96, 128], kind
+    assert set(made.summaries) == set(_LEARNING)
+
+
+def test_methods_start_with_the_source_policy(study: tuple[Study, Path]) -> None:
+    made, _ = study
+    starts = {kind: made.of(kind)[0].curve[0].mean_return for kind in _LEARNING}
+    assert starts["frozen-trunk"] == starts["evolution"] == starts["fine-tune"]
+
+
+def test_a_frozen_trunk_stays(study: tuple[Study, Path]) -> None:
+    """The second layer equals the source's, and all others have changed."""
+    source, frozen = _weights(study, "source"), _weights(study, "frozen-trunk")
+    tuned = _weights(study, "fine-tune")
+    trunk = "mlp_extractor.policy_net.2.weight"
+    assert torch.equal(frozen[trunk], source[trunk])
+    assert not torch.equal(tuned[trunk], source[trunk])
+    for name in ("mlp_extractor.policy_net.0.weight", "action_net.weight", "log_std"):
+        assert not torch.equal(frozen[name], source[name]), name
+    assert not torch.equal(
+        frozen["mlp_extractor.value_net.2.weight"], source["mlp_extractor.value_net.2.weight"]
+    )
+
+
+def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Distillation brings the policy closer to the source policy's actions."""
+    settings = msgspec.structs.replace(
+        TINY_NORMALISED, learning_rate=1e-2, n_steps=64, eval_every=512
+    )
+    plan = tiny_plan(settings, arms=("scratch", "kickstart"), steps=512, source_steps=512)
+    monkeypatch.setattr(training, "_UNTIL", 1e9)  # Weights are kept.
+    observations = np.random.default_rng(0).normal(0.0, 0.1, (200, 4))
+    away: list[float] = []
+    for weight in (0.0, 1.0):
+        monkeypatch.setattr(training, "_WEIGHT", weight)
+        out = tmp_path / f"weight-{weight:g}"
+        run_study(plan, out, executor=Serial())
+
+        def acts(kind: str, out: Path = out) -> Any:
+            return load_policy(Run(kind, 0).policy_file(out)).act
+
+        shown = MappedTeacher(acts("source"), plan.body_map)(observations)
+        away.append(float(np.abs(acts("kickstart")(observations) - shown).mean()))
+    assert away[1] < 0.8 * away[0], away
+
+
+def test_learned_actions_are_not_distilled() -> None:
+    source, target = ANT.make(), EXTENDED.make()
+    layouts = [
+        getattr(env.unwrapped, f"{side}_layout")
+        for side in ("observation", "action")
+        for env in (source, target)
+    ]
+    crossing = BodyMap.between(*layouts, rules={"foot_*/motor": "learn"})
+    teacher = MappedTeacher(lambda observations: np.ones((len(observations), 8)), crossing)
+    assert teacher.taught.sum() == 8
+    shown = teacher(np.zeros((3, target.observation_space.shape[0])))  # pyright: ignore[reportOptionalSubscript]
+    assert shown.shape == (3, 12)
+    assert (shown[:, teacher.taught] == 1.0).all()
+
+
+def test_intermediate_bodies_grow() -> None:
+    """Bodies between two pendulums grow in equal steps, without the two ends."""
+    lengths = []
+    for ref in bodies_between(SMALL, BIG, 2):
+        made = ref.make()
+        pole = made.unwrapped.model.geom("cpole")  # type: ignore[attr-defined]
+        lengths.append(2.0 * float(pole.size[1]))
+        made.close()
+    np.testing.assert_allclose(lengths, [0.6, 0.9], rtol=1e-5)
+
+
+def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
+    """Evolution from Ant to ExtendedAnt, with a rule for the new motors."""
+    short = {"max_episode_steps": 20}
+    plan = tiny_plan(
+        TINY_NORMALISED,
+        task=TransferTask(ANT.having(short), EXTENDED.having(short)),
+        rules={"foot_*/motor": "copy ankle_*/motor"},
+        arms=("scratch", "evolution"),
+        steps=64,
+        source_steps=32,
+    )
+    study = run_study(plan, tmp_path / "study", executor=Serial())
+    assert [e.steps for e in study.of("evolution")[0].curve] == [0, 32, 64]
+
+
+def test_bodies_of_two_families_are_refused() -> None:
+    with pytest.raises(StudyError, match="not of one family"):
+        bodies_between(ANT, BIG, 1)
+    finger = EnvRef("shapechanger/Finger-v1")
+    task = TransferTask(finger, finger.having({"gap": "real-like"}))
+    with pytest.raises(StudyError, match="evolution needs two bodies of one family"):
+        tiny_plan(task=task, arms=("scratch", "evolution"))
+
+
+def test_a_network_without_a_trunk_is_refused() -> None:
+    """frozen-trunk needs two hidden layers."""
+    with pytest.raises(StudyError, match="at least 2 hidden layers"):
+        tiny_plan(TINY, arms=("scratch", "frozen-trunk"))
+
+
+def test_a_shuffled_map_has_the_same_rules() -> None:
+    """Rules are exchanged between entries of one shape; constants stay."""
+    source, target = ANT.make(), EXTENDED.make()
+    layouts = [
+        getattr(env.unwrapped, f"{side}_layout")
+        for side in ("observation", "action")
+        for env in (source, target)
+    ]
+    right = BodyMap.between(*layouts)
+    wrong = shuffle(right, np.random.default_rng(0))
+    for side in ("observation", "action"):
+        ours, theirs = getattr(wrong, side), getattr(right, side)
+        assert [entry.feature for entry in ours] == [entry.feature for entry in theirs]
+        assert sorted(str(e.rule) for e in ours) == sorted(str(e.rule) for e in theirs)
+        moved = sum(a.rule != b.rule for a, b in zip(ours, theirs, strict=True))
+        assert moved > len(ours) // 2
+    assert shuffle(right, np.random.default_rng(0)) == wrong
+
+
+def test_a_randomised_source_draws_intermediate_bodies(tmp_path: Path) -> None:
+    """The env is written to the run's folder; bodies of other spaces are refused."""
+    plan = tiny_plan(TINY, steps=64, source_steps=64, arms=("scratch", "randomised"))
+    study = run_study(plan, tmp_path, executor=Serial())
+    assert study.curves("randomised").n_evals == 1
+    noted = json.loads((tmp_path / "runs" / "randomised-0" / "source.json").read_text())
+    assert noted["id"] == SMALL.id
+    assert noted["kwargs"]["towards"]
+    ants = TransferTask(ANT, EXTENDED)
+    with pytest.raises(StudyError, match="one family with the same spaces"):
+        tiny_plan(TINY, task=ants, arms=("scratch", "randomised"))
+
+
+def short(**more: Any) -> OffPolicySettings:
+    """Return settings of SAC for trainings of a second."""
+    _, settings = resolve_learner("sac", {**SHORT, **more})
+    assert isinstance(settings, OffPolicySettings)
+    return settings
+
+
+def test_a_study_with_both(tmp_path: Path) -> None:
+    """Both methods are evaluated at the steps of scratch, also with two envs."""
+    plan = tiny_plan(
+        short(n_envs=2),
+        steps=64,
+        source_steps=160,
+        arms=("scratch", "prefilled-replay", "off-dynamics"),
+    )
+    study = run_study(plan, tmp_path, executor=Serial())
+    wanted = study.curves("scratch").steps.tolist()
+    for arm in ("prefilled-replay", "off-dynamics"):
+        assert study.curves(arm).steps.tolist() == wanted == [0.0, 32.0, 64.0]
+
+
+def test_corrections_reward_target_like_steps() -> None:
+    torch.manual_seed(0)
+    classifiers = DomainClassifiers(1, 1, learning_rate=3e-3)
+
+    def batch(goes: float) -> tuple[torch.Tensor, ...]:
+        seen, acted = torch.randn(256, 1), torch.randn(256, 1)
+        return seen, acted, seen + goes * torch.sign(acted)
+
+    for _ in range(300):
+        classifiers.fit(batch(1.0), batch(-1.0))
+    of_source = classifiers.correction(*batch(1.0))
+    of_target = classifiers.correction(*batch(-1.0))
+    assert of_source.mean() < -1.0
+    assert of_target.mean() > 1.0
+    same = DomainClassifiers(1, 1, learning_rate=3e-3)
+    for _ in range(300):
+        same.fit(batch(1.0), batch(1.0))
+    assert same.correction(*batch(1.0)).abs().mean() < 0.3
+
+
+def test_transitions_are_those_of_the_env() -> None:
+    """Each transition starts where the last one ended, unless the episode ended."""
+    policy = Sb3Learner("sac", short()).train(SMALL, 32, 0, on_evaluation=_ignore)
+    seen = collect(SMALL, policy, 50, 3)
+    assert seen.observations.shape == seen.next_observations.shape == (50, 4)
+    goes_on = ~seen.terminated[:-1]
+    np.testing.assert_array_equal(
+        seen.next_observations[:-1][goes_on], seen.observations[1:][goes_on]
+    )
+    assert seen.terminated.any()
+    again = collect(SMALL, policy, 50, 3)
+    np.testing.assert_array_equal(again.actions, seen.actions)
+
+
+def test_mapped_transitions_are_those_of_the_target() -> None:
+    bodies = [EnvRef(f"shapechanger/{name}-v1").make() for name in ("Ant", "ExtendedAnt")]
+    (seen, acts), (sees, does) = (layouts_of(body) for body in bodies)
+    for body in bodies:
+        body.close()
+    body_map = BodyMap.between(seen, sees, acts, does)
+    rng = np.random.default_rng(0)
+    ours = Transitions(
+        rng.normal(size=(3, seen.size)),
+        rng.uniform(-1.0, 1.0, size=(3, acts.size)).astype(np.float32),
+        np.zeros(3),
+        rng.normal(size=(3, seen.size)),
+        np.zeros(3, bool),
+    )
+    theirs = _mapped(ours, body_map)
+    assert theirs.observations.shape == (3, sees.size)
+    assert theirs.actions.shape == (3, does.size)
+    for name in set(seen.names) & set(sees.names):
+        np.testing.assert_array_equal(
+            theirs.observations[:, sees.slices[name]], ours.observations[:, seen.slices[name]]
+        )
+
+
+def test_off_dynamics_needs_equal_spaces_and_plain_observations() -> None:
+    ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
+    with pytest.raises(StudyError, match="the same spaces"):
+        tiny_plan(short(), task=ants, arms=("scratch", "off-dynamics"))
+    with pytest.raises(StudyError, match="normalise=false"):
+        tiny_plan(short(normalise=True), arms=("scratch", "off-dynamics"))
+
+
+def _ignore(evaluation: Evaluation) -> None:
+    del evaluation

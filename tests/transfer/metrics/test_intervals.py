@@ -1,4 +1,4 @@
-"""Intervals: agreement with scipy, and samples without an interval."""
+"""Intervals of one study and of several: by hand, against scipy, and samples without one."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from shapechanger.errors import StudyError
 from shapechanger.transfer.metrics import (
     Estimate,
     estimate_difference,
     estimate_ratio,
+    interquartile_mean,
+    probability_of_improvement,
     undefined,
 )
 
@@ -42,14 +45,6 @@ def test_welch_agrees_with_scipy() -> None:
     assert ours.method == "Welch's t"
     np.testing.assert_allclose([ours.value], [ARM.mean() - SCRATCH.mean()])
     np.testing.assert_allclose([ours.low, ours.high], [theirs.low, theirs.high], rtol=1e-12)
-
-
-def test_welch_by_hand() -> None:
-    """Means 2 and 0, variances 1 and 1 of 3 seeds each: 2 ± t(0.975, 4) · sqrt(2/3)."""
-    estimate = estimate_difference(np.array([1.0, 2.0, 3.0]), np.array([-1.0, 0.0, 1.0]))
-    half = 2.7764451 * np.sqrt(2.0 / 3.0)
-    assert estimate.value == 2.0
-    np.testing.assert_allclose([estimate.low, estimate.high], [2 - half, 2 + half], rtol=1e-7)
 
 
 def test_welch_takes_one_arm_without_spread() -> None:
@@ -94,19 +89,6 @@ def test_studentised_bootstrap_by_the_book(scratch: NDArray[np.float64]) -> None
     assert ours.value == pytest.approx(value)
     np.testing.assert_allclose(
         [ours.low, ours.high], value - np.array([high, low]) * error(arm, scratch)
-    )
-
-
-def test_many_seeds_make_the_ratio_normal() -> None:
-    """With 200 seeds the interval is a normal distribution's, ± 1.96 errors."""
-    rng = np.random.default_rng(1)
-    arm, scratch = rng.normal(2.0, 0.2, 200), rng.normal(1.0, 0.1, 200)
-    estimate = ratio(arm, scratch, n_resamples=10_000)
-    assert estimate.note == ""
-    half = 1.96 * 2.0 * np.hypot(0.1, 0.1) / np.sqrt(200.0)
-    assert estimate.value is not None
-    np.testing.assert_allclose(
-        [estimate.low, estimate.high], [estimate.value - half, estimate.value + half], atol=0.006
     )
 
 
@@ -163,3 +145,63 @@ def test_unusable_resamples_are_not_dropped(
     assert estimate.value == pytest.approx(arm.mean() / scratch.mean())
     assert (estimate.low, estimate.high, estimate.method) == (None, None, "none")
     assert "resamples" in estimate.note
+
+
+_Groups = list[NDArray[np.float64]]
+
+
+def _rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+def test_the_middle_half_is_averaged() -> None:
+    """Of eight runs the two lowest and the two highest do not count."""
+    groups = [np.array([0.0, 1.0, 2.0, 100.0]), np.array([-50.0, 3.0, 4.0, 5.0])]
+    found = interquartile_mean(groups, rng=_rng())
+    assert found.value == pytest.approx((1.0 + 2.0 + 3.0 + 4.0) / 4)
+    assert found.low is not None
+    assert found.high is not None
+    assert found.low <= found.value <= found.high
+    assert found.method == "stratified bootstrap"
+
+
+def test_improvement_matches_mann_whitney() -> None:
+    """U over the number of pairs, averaged over studies; equal runs count half."""
+    rng = np.random.default_rng(1)
+    arm, scratch = rng.normal(0.5, 1.0, 7), rng.normal(0.0, 1.0, 5)
+    one = probability_of_improvement([arm], [scratch], rng=_rng())
+    u = stats.mannwhitneyu(arm, scratch).statistic
+    assert one.value == pytest.approx(u / 35)
+    both = probability_of_improvement([arm, np.ones(2)], [scratch, np.ones(3)], rng=_rng())
+    assert both.value == pytest.approx((u / 35 + 0.5) / 2)
+
+
+def test_intervals_are_quantiles_of_the_resamples() -> None:
+    """From 2.5 to 97.5 %, of means over studies."""
+    rng = np.random.default_rng(1)
+    arm, scratch = ([rng.normal(level, 1.0, 4) for level in (0.4, 0.0)] for _ in range(2))
+    found = probability_of_improvement(arm, scratch, rng=_rng())
+    again, means = _rng(), np.zeros(2000)
+    for x, y in zip(arm, scratch, strict=True):
+        xs, ys = (g[again.integers(g.size, size=(2000, g.size))] for g in (x, y))
+        means += [(a[:, None] > b).mean() / 2 for a, b in zip(xs, ys, strict=True)]
+    assert (found.low, found.high) == pytest.approx(tuple(np.quantile(means, [0.025, 0.975])))
+
+
+def test_runs_are_drawn_within_their_study() -> None:
+    """Different levels of studies do not widen the interval."""
+    steady = [np.full(5, level) for level in (0.0, 1.0, 2.0)]
+    found = interquartile_mean(steady, rng=_rng())
+    assert found.low == found.high == found.value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("groups", [[], [np.empty(0)]])
+def test_no_runs_are_refused(groups: _Groups) -> None:
+    with pytest.raises(StudyError, match="at least one run"):
+        interquartile_mean(groups, rng=_rng())
+
+
+def test_the_number_of_studies_must_match() -> None:
+    one = np.ones(2)
+    with pytest.raises(StudyError, match="1 studies of the arm and 2 of scratch"):
+        probability_of_improvement([one], [one, one], rng=_rng())

@@ -1,7 +1,8 @@
-"""Jumpstart, asymptotic gain, total reward gain and ratio, by hand."""
+"""The measures of an arm against scratch, by hand."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -9,13 +10,16 @@ import pytest
 
 from shapechanger.errors import StudyError
 from shapechanger.transfer.metrics import (
+    MIN_HEADROOM,
     Estimate,
     LearningCurves,
+    ReachTimes,
     asymptotic_gain,
     auc_ratio,
     forward_transfer,
     in_total_steps,
     jumpstart,
+    steps_to_reach,
     time_to_threshold,
     total_reward_gain,
 )
@@ -143,3 +147,121 @@ def test_every_measure_refuses_other_evaluations(
     shorter = LearningCurves(STEPS[:3], ARM.returns[:, :3])
     with pytest.raises(StudyError, match="must be the same"):
         measure(shorter, SCRATCH)
+
+
+# Reach 0.5 at 5, at 30, never, and at 0 although it falls below again.
+LATE = LearningCurves(
+    STEPS,
+    np.array([[0, 1.0, 1.0, 1.0], [0, 0, 0, 1.0], [0, 0.2, 0.4, 0.3], [0.5, 0.0, 0.0, 0.9]]),
+)
+# Reaches 0.5 at 40 and never.
+SLOW = LearningCurves(STEPS, np.array([[0, 0, 0, 0.5], [0, 0, 0, 0.4]]))
+
+
+def test_first_crossing_of_the_line() -> None:
+    """Linear between evaluations; reaching the threshold is enough; later falls do not count."""
+    np.testing.assert_allclose(steps_to_reach(LATE, 0.5), [5.0, 30.0, math.inf, 0.0])
+    np.testing.assert_allclose(steps_to_reach(SLOW, 0.5), [40.0, math.inf])
+
+
+def test_a_floor_above_the_threshold_is_there_at_once() -> None:
+    assert not steps_to_reach(in_total_steps(LATE, 10, 0.6), 0.5).any()
+    np.testing.assert_allclose(steps_to_reach(LATE, -1.0), np.zeros(4))
+
+
+def test_no_seed_is_dropped() -> None:
+    """A censored seed counts as the horizon: (5 + 30 + 40 + 0) / 4 against 40."""
+    times = time_to_threshold(LATE, SLOW, 0.5)
+    assert times.threshold == 0.5
+    assert times.arm == ReachTimes(fraction=0.75, restricted_mean=18.75, restricted_median=5.0)
+    assert times.scratch == ReachTimes(fraction=0.5, restricted_mean=40.0, restricted_median=40.0)
+    assert times.steps_saved.value == pytest.approx(21.25)
+    assert times.steps_saved.method == "Welch's t"
+
+
+def test_median_is_none_if_most_seeds_are_censored() -> None:
+    """The median is None if fewer than half the seeds reach the threshold."""
+    times = time_to_threshold(LATE, SLOW, 0.95)
+    assert times.arm is not None
+    assert times.arm.restricted_median == pytest.approx(39.0)
+    assert times.scratch == ReachTimes(fraction=0.0, restricted_mean=40.0, restricted_median=None)
+
+
+def test_no_seed_reaches_the_threshold() -> None:
+    """Then 0 steps are saved, without an interval."""
+    times = time_to_threshold(LATE, SLOW, 2.0)
+    assert times.steps_saved.value == 0.0
+    assert times.steps_saved.low is None
+    assert "all seeds" in times.steps_saved.note
+
+
+@pytest.mark.parametrize("threshold", [math.nan, math.inf])
+def test_threshold_is_a_number(threshold: float) -> None:
+    with pytest.raises(StudyError, match="finite"):
+        time_to_threshold(LATE, SLOW, threshold)
+
+
+THREE = np.array([0.0, 10.0, 20.0])
+
+
+def curves(*rows: tuple[float, float, float]) -> LearningCurves:
+    """Return scores of a few seeds."""
+    return LearningCurves(THREE, np.array(rows))
+
+
+def transfer(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
+    """Return `forward_transfer` with few resamples."""
+    return forward_transfer(arm, scratch, rng=np.random.default_rng(0))
+
+
+# Areas 0.4 and 0.6, 0.5 on the mean; and 0.1 and 0.3, 0.2 on the mean.
+BETTER = curves((0.0, 0.4, 0.8), (0.2, 0.6, 1.0))
+WORSE = curves((0.0, 0.1, 0.2), (0.1, 0.3, 0.5))
+
+
+def test_forward_transfer() -> None:
+    assert transfer(BETTER, WORSE).value == pytest.approx(0.375)
+
+
+def test_interval() -> None:
+    """With enough seeds there is a bootstrap interval, whose ends are at most 1."""
+    heights = np.linspace(0.0, 0.3, 5)
+    arm = curves(*((h, 0.3 + h, 0.6 + h) for h in heights))
+    scratch = curves(*((h, h, h) for h in heights))
+    estimate = transfer(arm, scratch)
+    assert estimate.method == "studentised bootstrap"
+    assert estimate.value is not None
+    assert estimate.low is not None
+    assert estimate.high is not None
+    assert 0.0 < estimate.low < estimate.value < estimate.high < 1.0
+    # Most seeds can do nearly everything at once: less than nothing might seem to be left.
+    skewed = curves(*((h, h, h) for h in (0.99, 0.98, 1.0, 0.95, 0.2)))
+    assert transfer(skewed, scratch).high == 1.0
+
+
+def test_forward_transfer_in_total_steps() -> None:
+    """With half the budget on the source: (0.15 - 0.2) / (1 - 0.2)."""
+    assert transfer(in_total_steps(BETTER, 10, 0.0), WORSE).value == pytest.approx(-0.0625)
+
+
+@pytest.mark.parametrize(
+    ("height", "is_defined"), [(1.0, False), (0.995, False), (0.98, True), (0.0, True)]
+)
+def test_headroom_is_needed(height: float, is_defined: bool) -> None:
+    estimate = transfer(BETTER, curves((height, height, height)))
+    assert (estimate.value is not None) is is_defined
+    if not is_defined:
+        assert f"less than {MIN_HEADROOM:g}" in estimate.note
+
+
+@pytest.mark.parametrize("outside", [-0.1, 1.1])
+def test_scores_must_be_clipped(outside: float) -> None:
+    """Values outside [0, 1] are refused."""
+    wild = curves((0.0, 0.5, outside))
+    for arm, scratch in (
+        (wild, WORSE),
+        (BETTER, wild),
+        (in_total_steps(BETTER, 5, outside), WORSE),
+    ):
+        with pytest.raises(StudyError, match="clip=True"):
+            transfer(arm, scratch)

@@ -1,16 +1,14 @@
-"""Learning curves: validation, interpolation, and areas by hand."""
+"""Learning curves and scores: validation, interpolation, areas and references by hand."""
 
 from __future__ import annotations
 
-import copy
-import pickle
-from collections.abc import Callable
+import math
 
 import numpy as np
 import pytest
 
 from shapechanger.errors import StudyError
-from shapechanger.transfer.metrics import LearningCurves, in_total_steps
+from shapechanger.transfer.metrics import LearningCurves, Reference, in_total_steps
 from shapechanger.transfer.metrics.curves import check_comparable
 
 # Two seeds, three evaluations: one rises from 0 to 1, one falls from 1 to 0.
@@ -53,40 +51,19 @@ def test_floor_must_be_finite(floor: float) -> None:
         in_total_steps(RISING, 10, floor)
 
 
-def test_curves_are_copies() -> None:
-    """Later changes of the given arrays have no effect."""
+def test_curves_are_read_only_copies() -> None:
+    """Later changes of the given arrays have no effect, and fields cannot be written to."""
     steps, returns = np.array([0.0, 1.0]), np.array([[1.0, 2.0]])
-    curves = LearningCurves(steps, returns)
+    curves = in_total_steps(LearningCurves(steps, returns), 1, 0.5)
     steps[1], returns[0, 0] = 9.0, 9.0
     np.testing.assert_array_equal(curves.steps, [0.0, 1.0])
     np.testing.assert_array_equal(curves.returns, [[1.0, 2.0]])
-
-
-@pytest.mark.parametrize(
-    "copied_from",
-    [
-        lambda curves: curves,
-        copy.deepcopy,
-        lambda curves: pickle.loads(pickle.dumps(curves)),
-        lambda curves: in_total_steps(curves, 1, 0.5),
-    ],
-    ids=["built", "copied", "pickled", "counted"],
-)
-def test_curves_cannot_be_written_to(
-    copied_from: Callable[[LearningCurves], LearningCurves],
-) -> None:
-    """Fields and arrays are read-only, also in copies and pickles."""
-    built = in_total_steps(RISING, 1, 0.5)
-    again = copy.deepcopy(built)
-    assert (again.source_steps, again.floor) == (1.0, 0.5)
-    copied = copied_from(RISING)
-    with pytest.raises(ValueError, match="read-only"):
-        copied.returns[0, 0] = 1.0
-    with pytest.raises(ValueError, match="read-only"):
-        copied.steps[0] = 1.0
+    assert (curves.source_steps, curves.floor) == (1.0, 0.5)
+    for numbers in (curves.steps, curves.returns):
+        with pytest.raises(ValueError, match="read-only"):
+            numbers[0] = 1.0
     with pytest.raises(AttributeError):
-        copied.floor = 1.0  # type: ignore[misc]
-    np.testing.assert_array_equal(copied.returns, RISING.returns)
+        curves.floor = 1.0  # type: ignore[misc]
 
 
 def test_curves_are_straight_between_evaluations_and_hold_their_end() -> None:
@@ -145,3 +122,77 @@ def test_source_steps_count_once() -> None:
 def test_scratch_has_no_source() -> None:
     with pytest.raises(StudyError, match="cannot count source steps"):
         check_comparable(RISING, in_total_steps(RISING, 30, 0.0))
+
+
+FEW = np.array([0.0, 10.0, 20.0])
+SCRATCH = LearningCurves(FEW, np.array([[-100.0, 200.0, 300.0], [-100.0, 400.0, 300.0]]))
+
+
+def test_scores_run_from_zero_to_one() -> None:
+    """0 takes no skill and 1 is the end of the best arm; a better run is above 1."""
+    reference = Reference(zero=-100.0, one=300.0)
+    scores = reference.scores(LearningCurves(FEW, np.array([[-200.0, 100.0, 500.0]])))
+    np.testing.assert_allclose(scores.returns, [[-0.25, 0.5, 1.5]])
+    np.testing.assert_array_equal(scores.steps, FEW)
+    clipped = reference.scores(LearningCurves(FEW, np.array([[-200.0, 100.0, 500.0]])), clip=True)
+    np.testing.assert_allclose(clipped.returns, [[0.0, 0.5, 1.0]])
+
+
+def test_a_shipped_reference_overrides_the_best_arm() -> None:
+    """A shipped reference is 1 in every study, so a better arm scores above 1."""
+    floors, ends = {"random actions": -100.0}, {"scratch": 100.0, "fine-tune": 500.0}
+    of_arms = Reference.of(floors, ends)
+    assert (of_arms.one, of_arms.one_of, of_arms.shipped) == (500.0, "fine-tune", False)
+    shipped = Reference.of(floors, ends, ("the reference", 300.0))
+    assert (shipped.one, shipped.one_of, shipped.shipped) == (300.0, "the reference", True)
+    scores = shipped.scores(LearningCurves(FEW, np.array([[-100.0, 300.0, 500.0]])))
+    np.testing.assert_allclose(scores.returns, [[0.0, 1.0, 1.5]])
+
+
+def test_the_floor_is_scored_too() -> None:
+    """Counting source steps and scoring commute."""
+    reference = Reference(zero=-100.0, one=300.0)
+    first_counted = reference.scores(in_total_steps(SCRATCH, 7, reference.zero))
+    first_scored = in_total_steps(reference.scores(SCRATCH), 7, 0.0)
+    assert first_counted.floor == first_scored.floor == 0.0
+    np.testing.assert_array_equal(first_counted.auc(), first_scored.auc())
+
+
+def test_a_reference_is_the_best_floor_and_the_best_end() -> None:
+    floors = {"random actions": -10.0, "the zero action": 997.0, "untrained policies": 994.0}
+    reference = Reference.of(floors, {"scratch": 1100.0, "fine-tune": 1500.0})
+    assert reference == Reference(997.0, 1500.0, "the zero action", "fine-tune")
+
+
+def test_a_reference_needs_both_ends() -> None:
+    with pytest.raises(StudyError, match="needs a floor"):
+        Reference.of({}, {"scratch": 1.0})
+    with pytest.raises(StudyError, match="needs a floor"):
+        Reference.of({"random actions": 1.0}, {})
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_reference_is_finite(bad: float) -> None:
+    with pytest.raises(StudyError, match="finite"):
+        Reference(zero=bad, one=1.0)
+    with pytest.raises(StudyError, match="finite"):
+        Reference(zero=0.0, one=bad)
+
+
+@pytest.mark.parametrize(
+    ("zero", "one", "defined"),
+    [
+        (0.0, 1.0, True),
+        (5.0, 5.0, False),
+        (5.0, 4.0, False),
+        (1e6, 1e6 + 1e-6, False),
+        (-1e6, 1e6, True),
+    ],
+)
+def test_scores_exist_only_if_an_arm_learned(zero: float, one: float, defined: bool) -> None:
+    """Scores are undefined unless an arm ended above zero, beyond rounding."""
+    reference = Reference(zero, one)
+    assert reference.defined is defined
+    if not defined:
+        with pytest.raises(StudyError, match="no arm learned"):
+            reference.scores(SCRATCH)
