@@ -24,12 +24,8 @@ from shapechanger.cli.suite import SuiteRun
 from shapechanger.envs.suite_file import load_suite, suite_tasks
 from shapechanger.errors import StudyError
 from shapechanger.files import read_json, write_json
-from shapechanger.transfer.metrics import (
-    estimate_difference,
-    jumpstart,
-    probability_of_improvement,
-    total_reward_gain,
-)
+from shapechanger.transfer.metrics.intervals import estimate_difference, probability_of_improvement
+from shapechanger.transfer.metrics.measures import jumpstart, total_reward_gain
 from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.report.curves import sweep_chart
 from shapechanger.transfer.report.suite import gain_over_scratch

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from shapechanger.transfer.metrics import estimate_ratio
+from shapechanger.transfer.metrics.intervals import estimate_ratio
 
 Array = NDArray[np.float64]
 

@@ -8,15 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import (
-    BodyMap,
-    Copy,
-    Hold,
-    Learn,
-    MapEntry,
-    Rule,
-    Zero,
-)
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, MapEntry, Rule, Zero
 
 # A fixed number of examples.
 law = settings(max_examples=25)
@@ -172,11 +164,7 @@ def test_json_round_trip(built: BodyMap) -> None:
 
 
 @law
-@given(
-    legs=st.integers(1, 4),
-    flip=st.booleans(),
-    order=st.randoms(use_true_random=False),
-)
+@given(legs=st.integers(1, 4), flip=st.booleans(), order=st.randoms(use_true_random=False))
 def test_a_mirror_is_its_own_inverse(legs: int, flip: bool, order: object) -> None:
     """Holds for any order of features."""
     names = [f"torso/{q}" for q in ("y", "qw", "qx", "qy", "qz", "vx", "vy", "wx", "wy", "wz")]

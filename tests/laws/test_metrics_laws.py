@@ -10,15 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from shapechanger.transfer.metrics import (
-    Estimate,
-    LearningCurves,
-    Reference,
+from shapechanger.transfer.metrics.curves import LearningCurves, Reference, in_total_steps
+from shapechanger.transfer.metrics.intervals import Estimate
+from shapechanger.transfer.metrics.measures import (
     Summary,
     asymptotic_gain,
     auc_ratio,
     forward_transfer,
-    in_total_steps,
     jumpstart,
     steps_to_reach,
     summarise,
@@ -69,12 +67,7 @@ def summary_of(
 ) -> Summary:
     """Summarise with few resamples and a fixed seed."""
     return summarise(
-        scratch,
-        arm,
-        reference,
-        source_steps=source,
-        rng=np.random.default_rng(0),
-        last_k=1,
+        scratch, arm, reference, source_steps=source, rng=np.random.default_rng(0), last_k=1
     )
 
 
@@ -120,11 +113,7 @@ def test_ratios_of_an_arm_with_itself(pair: Pair) -> None:
     clip=st.booleans(),
 )
 def test_scores_are_invariant_to_reward_units(
-    pair: Pair,
-    scale: float,
-    offset: float,
-    span: float,
-    clip: bool,
+    pair: Pair, scale: float, offset: float, span: float, clip: bool
 ) -> None:
     """Affine invariance: scaling and shifting the reward does not change scores."""
     curves, _ = pair

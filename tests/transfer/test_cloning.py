@@ -19,7 +19,7 @@ from shapechanger.transfer.learners import SharedFile
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.metrics import Summary, summarise
+from shapechanger.transfer.metrics.measures import Summary, summarise
 from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 from shapechanger.vehicles import cloning

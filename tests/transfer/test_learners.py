@@ -162,12 +162,7 @@ def test_a_transplanted_policy_acts_as_the_source(learner: str) -> None:
     plan = tiny_plan(settings)
     moved: list[Evaluation] = []
     Sb3Learner(learner, settings).train(
-        BIG,
-        64,
-        1,
-        on_evaluation=moved.append,
-        start=policy,
-        body_map=plan.body_map,
+        BIG, 64, 1, on_evaluation=moved.append, start=policy, body_map=plan.body_map
     )
     zero_shot = Sb3Learner(learner, settings).evaluate(BIG, policy, plan.body_map)
     assert moved[0].mean_return == pytest.approx(zero_shot.mean_return)

@@ -32,13 +32,7 @@ from shapechanger.files import read_json
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Serial
 from shapechanger.transfer.plan import ARMS, TransferTask
-from shapechanger.transfer.study import (
-    STUDY_FILE,
-    Study,
-    default_arms,
-    inspect_task,
-    run_study,
-)
+from shapechanger.transfer.study import STUDY_FILE, Study, default_arms, inspect_task, run_study
 from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, curves, tiny_plan
 
 

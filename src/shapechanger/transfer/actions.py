@@ -78,10 +78,7 @@ class ActionScale(NamedTuple):
         """Return middle and half width, (n,), of the env's actions over a bounded model space."""
         box = cast("Box[Any]", space)
         low, high = box.low.astype(np.float64), box.high.astype(np.float64)
-        return (
-            self.middle + self.half * (0.5 * (low + high)),
-            self.half * (0.5 * (high - low)),
-        )
+        return (self.middle + self.half * (0.5 * (low + high)), self.half * (0.5 * (high - low)))
 
 
 def learners_space(space: Any) -> Box[np.float32]:

@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, cast
 
 from shapechanger.errors import FailedRuns, OutputError, ShapechangerError, StudyError
 
@@ -199,56 +199,51 @@ class Processes(Executor):
         if workers is not None and workers < 1:
             raise StudyError(f"A study needs at least one worker, got {workers}.")
         self._most = workers or os.cpu_count() or 1
-        self._idle: list[_Worker] = []
-        self._busy: dict[Any, _Worker] = {}
+        self._idle: dict[Connection, BaseProcess] = {}
+        self._busy: dict[Connection, tuple[BaseProcess, str]] = {}
 
     def _begin(self, job: Job) -> None:
-        worker = self._idle.pop() if self._idle else _Worker()
-        self._busy[worker.connection] = worker
-        worker.begin(job)
+        connection, process = self._idle.popitem() if self._idle else _worker()
+        self._busy[connection] = process, job.name
+        with suppress(ConnectionError):  # A process that has ended is noticed when it is heard.
+            connection.send((job.function, job.arguments))
 
     def _events(self) -> Iterable[Event]:
-        for connection in wait(list(self._busy)):
-            worker = self._busy[connection]
+        for ready in wait(list(self._busy)):
+            connection = cast("Connection", ready)
+            process, job = self._busy[connection]
             try:
-                kind, content = worker.connection.recv()
+                kind, content = connection.recv()
             except (EOFError, ConnectionError):  # The latter if it has not read its job.
-                kind, content = "lost", f"exit code {worker.end()}"
+                kind, content = "lost", f"exit code {_end(connection, process)}"
             if kind != "steps":
                 del self._busy[connection]
                 if kind != "lost":
-                    self._idle.append(worker)
-            yield worker.job, kind, content
+                    self._idle[connection] = process
+            yield job, kind, content
 
     def _close(self) -> None:
-        for worker in (*self._idle, *self._busy.values()):
-            worker.end()
-        self._idle, self._busy = [], {}
+        busy = {connection: process for connection, (process, _) in self._busy.items()}
+        for connection, process in (self._idle | busy).items():
+            _end(connection, process)
+        self._idle, self._busy = {}, {}
 
 
-class _Worker:
-    """A process that runs jobs one after another."""
+def _worker() -> tuple[Connection, BaseProcess]:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs,), daemon=True)
+    process.start()
+    theirs.close()
+    return ours, process
 
-    job: str
 
-    def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.connection, theirs = context.Pipe()
-        self._process: BaseProcess = context.Process(target=_serve, args=(theirs,), daemon=True)
-        self._process.start()
-        theirs.close()
-
-    def begin(self, job: Job) -> None:
-        self.job = job.name
-        with suppress(ConnectionError):  # A process that has ended is noticed when it is heard.
-            self.connection.send((job.function, job.arguments))
-
-    def end(self) -> int | None:
-        """End the process, and return its exit code; negative for a signal."""
-        self._process.terminate()
-        self._process.join()
-        self.connection.close()
-        return self._process.exitcode
+def _end(connection: Connection, process: BaseProcess) -> int | None:
+    """End a worker, and return its exit code; negative for a signal."""
+    process.terminate()
+    process.join()
+    connection.close()
+    return process.exitcode
 
 
 def _serve(connection: Connection) -> None:

@@ -69,10 +69,7 @@ def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, pat
     rows = fitted(env, policy.card.layouts[0], settings.room).rows
     observation, action = layouts_of(env)
     exported = policy.carded(
-        env=ref,
-        observation=observation,
-        action=action,
-        identity=identities_in(ref, env, settings),
+        env=ref, observation=observation, action=action, identity=identities_in(ref, env, settings)
     )
     _write(_LimbActions(policy.model.policy, rows), exported.card, path)
 

@@ -9,21 +9,12 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
-import sys
 from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any, Final
 
 from shapechanger.errors import MissingExtra, StudyError
-from shapechanger.transfer.executor import (
-    Event,
-    Executor,
-    Job,
-    OnProgress,
-    failure_of,
-    throttled,
-)
+from shapechanger.transfer.executor import Event, Executor, Job, OnProgress, failure_of, throttled
 
 # Set before Ray is imported; otherwise Ray reports usage statistics.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -111,11 +102,6 @@ def _require_answer(address: str) -> None:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECT_S).close()
     except (OSError, OverflowError) as error:
         raise _no_answer(address, "nothing listens there") from error
-    command = [sys.executable, "-m", "ray.scripts.scripts", "health-check", "--address", address]
-    try:
-        subprocess.run(command, check=True, capture_output=True, timeout=_ANSWER_S)
-    except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
-        raise _no_answer(address, "nothing there is healthy") from error
 
 
 def _no_answer(address: str, reason: str) -> StudyError:

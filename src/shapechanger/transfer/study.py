@@ -22,12 +22,7 @@ from shapechanger.contract.env_ref import (
     is_reward_term,
 )
 from shapechanger.contract.measure import RETURN, Measure
-from shapechanger.errors import (
-    ForeignStudy,
-    SpaceMismatch,
-    StudyError,
-    UnknownName,
-)
+from shapechanger.errors import ForeignStudy, SpaceMismatch, StudyError, UnknownName
 from shapechanger.files import make_folder, read_json, write_json
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
@@ -35,7 +30,8 @@ from shapechanger.transfer.identities import known, require_same_env, steady
 from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
-from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
+from shapechanger.transfer.metrics.curves import LearningCurves, Reference
+from shapechanger.transfer.metrics.measures import Summary, summarise
 from shapechanger.transfer.plan import (
     ARMS,
     NO_SKILL,

@@ -18,7 +18,9 @@ import msgspec
 from shapechanger.contract.measure import RETURN
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
 from shapechanger.files import make_folder
-from shapechanger.transfer.metrics import Estimate, LearningCurves, steps_to_reach
+from shapechanger.transfer.metrics.curves import LearningCurves
+from shapechanger.transfer.metrics.intervals import Estimate
+from shapechanger.transfer.metrics.measures import steps_to_reach
 from shapechanger.transfer.plan import PLAN_FILE, SOURCE, Plan, read_plan
 from shapechanger.transfer.runs import load_result
 from shapechanger.transfer.study import Study, claim_folder

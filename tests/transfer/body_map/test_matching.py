@@ -72,11 +72,7 @@ def test_hold_is_the_middle_of_the_range() -> None:
         # Only an exact name overrides a partner of the same name.
         (
             {"*/motor": "learn", "hip_1/motor": "zero"},
-            {
-                "hip_1/motor": Zero(),
-                "hip_2/motor": Copy("hip_2/motor"),
-                "foot_2/motor": Learn(),
-            },
+            {"hip_1/motor": Zero(), "hip_2/motor": Copy("hip_2/motor"), "foot_2/motor": Learn()},
         ),
         ({"foot_*/motor": "copy ankle_*/motor"}, {"foot_3/motor": Copy("ankle_3/motor")}),
     ],

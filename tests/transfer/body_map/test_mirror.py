@@ -141,12 +141,7 @@ def test_paths_of_several_parts_are_kept() -> None:
 
 @pytest.mark.parametrize(
     ("left", "right", "fits"),
-    [
-        (1.0, 1.0 + 5e-10, True),
-        (1.0, 1.0 + 1e-8, False),
-        (0.0, 5e-13, True),
-        (0.0, 1e-11, False),
-    ],
+    [(1.0, 1.0 + 5e-10, True), (1.0, 1.0 + 1e-8, False), (0.0, 5e-13, True), (0.0, 1e-11, False)],
 )
 def test_ranges_of_a_pair_agree_up_to_rounding(left: float, right: float, fits: bool) -> None:
     layout = Layout((Feature("l/x", "m", -2.0, left), Feature("r/x", "m", -2.0, right)))

@@ -70,12 +70,7 @@ MOTOR = _layout("motor")
         (
             ("a[]_1", "b[!]_2", "c]_3", "d]_4", "same"),
             ("x1", "x2", "y]3", "y]4", "same"),
-            {
-                "a[]_*": "copy x*",
-                "b[!]_*": "copy x*",
-                "c[]]_*": "copy y**",
-                "d[!a]_*": "copy y**",
-            },
+            {"a[]_*": "copy x*", "b[!]_*": "copy x*", "c[]]_*": "copy y**", "d[!a]_*": "copy y**"},
             (Copy("x1"), Copy("x2"), Copy("y]3"), Copy("y]4"), Copy("same")),
         ),
     ],

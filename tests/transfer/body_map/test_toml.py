@@ -61,10 +61,7 @@ def test_exact_rules_are_not_checked() -> None:
 
 @pytest.mark.parametrize(("of", "feet"), [("", (False, True)), ('of = "target"', (True, False))])
 def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -> None:
-    layouts = (
-        *(ant_observation(feet=f) for f in feet),
-        *(ant_action(feet=f) for f in feet),
-    )
+    layouts = (*(ant_observation(feet=f) for f in feet), *(ant_action(feet=f) for f in feet))
     text = f'[symmetry]\n{of}\nswap = {{ "*_1" = "*_4", "*_2" = "*_3" }}\nflip = ["hip_*"]\n'
     image = BodyMap.mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
     there, built = BodyMap.between(*layouts), BodyMap.from_toml(text, *layouts)

@@ -52,12 +52,7 @@ def _learner(**changed: Any) -> RslLimbLearner:
 def _worlds(bodies: list[str]) -> RslVecEnv:
     """Return worlds of ants as rows, with one body each."""
     envs = shapechanger.make_vec(
-        "Ant",
-        len(bodies),
-        backend="warp",
-        device="cpu",
-        bodies=bodies,
-        max_episode_steps=20,
+        "Ant", len(bodies), backend="warp", device="cpu", bodies=bodies, max_episode_steps=20
     )
     rows = rows_of_each([ANT.having({"body": body}) for body in bodies])
     return RslVecEnv(envs, 0, DeviceRows(envs, rows))

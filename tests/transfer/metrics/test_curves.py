@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import StudyError
-from shapechanger.transfer.metrics import LearningCurves, Reference, in_total_steps
-from shapechanger.transfer.metrics.curves import check_comparable
+from shapechanger.transfer.metrics.curves import (
+    LearningCurves,
+    Reference,
+    check_comparable,
+    in_total_steps,
+)
 
 # Two seeds, three evaluations: one rises from 0 to 1, one falls from 1 to 0.
 STEPS = np.array([0.0, 50.0, 100.0])

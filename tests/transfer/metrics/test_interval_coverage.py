@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from benchmarks.interval_coverage import CASES, METHODS, Case, Measured, measure
-from shapechanger.transfer.metrics import Estimate, estimate_difference
+from shapechanger.transfer.metrics.intervals import Estimate, estimate_difference
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "statistics.md"
 TRIALS = 2000

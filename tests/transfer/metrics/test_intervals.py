@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from shapechanger.errors import StudyError
-from shapechanger.transfer.metrics import (
+from shapechanger.transfer.metrics.intervals import (
     Estimate,
     estimate_difference,
     estimate_ratio,
@@ -22,10 +22,7 @@ SCRATCH = np.array([0.5, 0.4, 0.7, 0.6])
 
 
 def ratio(
-    arm: NDArray[np.float64],
-    scratch: NDArray[np.float64],
-    *,
-    n_resamples: int = 2000,
+    arm: NDArray[np.float64], scratch: NDArray[np.float64], *, n_resamples: int = 2000
 ) -> Estimate:
     """Return `estimate_ratio` with few resamples and a least mean of 0.01."""
     return estimate_ratio(

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import StudyError
-from shapechanger.transfer.metrics import (
+from shapechanger.transfer.metrics.curves import LearningCurves, in_total_steps
+from shapechanger.transfer.metrics.intervals import Estimate
+from shapechanger.transfer.metrics.measures import (
     MIN_HEADROOM,
-    Estimate,
-    LearningCurves,
     ReachTimes,
     asymptotic_gain,
     auc_ratio,
     forward_transfer,
-    in_total_steps,
     jumpstart,
     steps_to_reach,
     time_to_threshold,
@@ -151,8 +150,7 @@ def test_every_measure_refuses_other_evaluations(
 
 # Reach 0.5 at 5, at 30, never, and at 0 although it falls below again.
 LATE = LearningCurves(
-    STEPS,
-    np.array([[0, 1.0, 1.0, 1.0], [0, 0, 0, 1.0], [0, 0.2, 0.4, 0.3], [0.5, 0.0, 0.0, 0.9]]),
+    STEPS, np.array([[0, 1.0, 1.0, 1.0], [0, 0, 0, 1.0], [0, 0.2, 0.4, 0.3], [0.5, 0.0, 0.0, 0.9]])
 )
 # Reaches 0.5 at 40 and never.
 SLOW = LearningCurves(STEPS, np.array([[0, 0, 0, 0.5], [0, 0, 0, 0.4]]))

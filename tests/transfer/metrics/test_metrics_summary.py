@@ -6,12 +6,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.transfer.metrics import (
+from shapechanger.transfer.metrics.curves import LearningCurves, Reference
+from shapechanger.transfer.metrics.intervals import Estimate
+from shapechanger.transfer.metrics.measures import (
     DEFAULT_THRESHOLDS,
-    Estimate,
-    LearningCurves,
     Measures,
-    Reference,
     Summary,
     forward_transfer,
     summarise,
@@ -30,12 +29,7 @@ def summary(
 ) -> Summary:
     """Return a summary with few resamples."""
     return summarise(
-        SCRATCH,
-        arm,
-        reference,
-        source_steps=source_steps,
-        rng=np.random.default_rng(0),
-        last_k=1,
+        SCRATCH, arm, reference, source_steps=source_steps, rng=np.random.default_rng(0), last_k=1
     )
 
 

@@ -13,7 +13,8 @@ from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.settings import PpoSettings
-from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
+from shapechanger.transfer.metrics.curves import LearningCurves, Reference
+from shapechanger.transfer.metrics.measures import Summary, summarise
 from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study

@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.reports.numbers import (
-    interval_text,
-    list_text,
-    number,
-    spread_text,
-    t_interval,
-)
-from shapechanger.transfer.metrics import Estimate, undefined
+from shapechanger.reports.numbers import interval_text, list_text, number, spread_text, t_interval
+from shapechanger.transfer.metrics.intervals import Estimate, undefined
 from shapechanger.transfer.report.verdict import estimate_text
 
 

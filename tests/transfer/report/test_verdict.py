@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.transfer.metrics import Estimate
+from shapechanger.transfer.metrics.intervals import Estimate
 from shapechanger.transfer.report.verdict import (
     Direction,
     MeasureRow,

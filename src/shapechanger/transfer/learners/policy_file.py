@@ -186,7 +186,7 @@ def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
 
 def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str) -> BaseAlgorithm:
     """Build the model that the card describes, with the weights of the file."""
-    settings: Any = card.settings
+    settings: Any = card.settings.for_model()  # As in its training.
     if settings.algorithm != algorithm:
         require_class(settings.algorithm)
     spaces: list[gym.spaces.Box] = []
@@ -197,8 +197,6 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
         if low.shape != (layout.size,):
             raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
         spaces.append(gym.spaces.Box(low, high, dtype=low.dtype.type))
-    if "device" in settings.takes:
-        settings = settings.for_one_env()  # Same settings as in its training.
     envs = DummyVecEnv([lambda: SpacesOnly(*spaces)] * settings.n_envs)
     # Building a model seeds Python, NumPy and PyTorch; a training around it must not repeat itself.
     states = random.getstate(), np.random.get_state(), torch.get_rng_state()  # noqa: NPY002

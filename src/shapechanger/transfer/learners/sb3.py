@@ -193,37 +193,29 @@ class Sb3Learner(Learner[Sb3Settings]):
     _normalises_observations = True
 
     def _first_model(
-        self,
-        envs: VecEnv,
-        card: PolicyCard,
-        start: TrainedPolicy | None,
-        body_map: BodyMap | None,
+        self, envs: VecEnv, card: PolicyCard, start: TrainedPolicy | None, body_map: BodyMap | None
     ) -> tuple[BaseAlgorithm, tuple[float, ...] | None]:
         """Return the model that a training begins with, and its `start_log_std`."""
-        settings: Any = card.settings
-        if "device" in settings.takes:
-            settings = settings.for_one_env()
-        logs = None if self.tensorboard is None else str(self.tensorboard)
         if start is None or body_map is None:
-            return build_model(settings, envs, card.seed, logs), None
+            return self._new_model(envs, card), None
         if start.normalisation is not None and isinstance(envs, VecNormalize):
             # The critic predicts rewards divided by these.
             envs.ret_rms = start.normalisation.reward.copy()
-        model = self._moved(start, envs, settings, card, body_map, logs)
-        return model, _explore(model, settings)
+        model = self._moved(start, envs, card, body_map)
+        return model, _explore(model, card.settings)
+
+    @property
+    def _logs(self) -> str | None:
+        return None if self.tensorboard is None else str(self.tensorboard)
+
+    def _new_model(self, envs: VecEnv, card: PolicyCard) -> BaseAlgorithm:
+        return build_model(card.settings.for_model(), envs, card.seed, self._logs)
 
     def _moved(
-        self,
-        source: TrainedPolicy,
-        envs: VecEnv,
-        settings: Sb3Settings,
-        card: PolicyCard,
-        body_map: BodyMap,
-        logs: str | None,
+        self, source: TrainedPolicy, envs: VecEnv, card: PolicyCard, body_map: BodyMap
     ) -> BaseAlgorithm:
         """The source policy in the target's shapes, with its statistics, ready for training."""
-        arguments, statistics = dict(settings.model_arguments), source.normalisation
-        arguments.pop("policy_kwargs", None)
+        arguments, statistics = card.settings.for_model().model_arguments, source.normalisation
         return transplant(
             source.model,
             body_map,
@@ -231,8 +223,8 @@ class Sb3Learner(Learner[Sb3Settings]):
             normalisation=None if statistics is None else statistics.observation,
             seed=card.seed,
             device="cpu",
-            tensorboard_log=logs,
-            **arguments,
+            tensorboard_log=self._logs,
+            **{name: value for name, value in arguments.items() if name != "policy_kwargs"},
         )
 
     def _require_finite(self, model: BaseAlgorithm) -> None:

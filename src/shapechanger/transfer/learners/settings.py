@@ -73,6 +73,10 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
         changed: dict[str, Any] = {"n_envs": 1, self._steps_per_update: self.update_steps}
         return msgspec.structs.replace(self, **changed)
 
+    def for_model(self) -> Self:
+        """Return the settings of its model: of one env if worlds on a device are stepped."""
+        return self.for_one_env() if "device" in self.takes else self
+
     def for_budget(self, steps: int) -> Self:
         """Return the settings for a shorter budget: four evaluations, no source default."""
         every = min(self.eval_every, self.whole_updates(steps // 4))

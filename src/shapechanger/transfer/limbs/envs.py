@@ -17,10 +17,8 @@ from shapechanger.errors import StudyError, TransplantError
 from shapechanger.layout import Layout
 from shapechanger.policy import PolicyCard
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.learners.algorithms import build_model
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.learners.vec_env import training_vec_env
 from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns, rows_of
 
@@ -41,10 +39,6 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
         StudyError: If the body has more limbs than room, or the env does not describe its tree.
         LayoutError: If an observation or an action belongs to no part of the body.
     """
-
-    rows: LimbRows
-    observation_layout: Layout
-    action_layout: Layout
 
     def __init__(self, env: gym.Env[Any, Any], room: int = 0) -> None:
         super().__init__(env)
@@ -248,17 +242,11 @@ class LimbLearner(Sb3Learner):
         return envs
 
     def _moved(
-        self,
-        source: TrainedPolicy,
-        envs: VecEnv,
-        settings: Sb3Settings,
-        card: PolicyCard,
-        body_map: BodyMap,
-        logs: str | None,
+        self, source: TrainedPolicy, envs: VecEnv, card: PolicyCard, body_map: BodyMap
     ) -> BaseAlgorithm:
         del body_map
         require_same_columns(source.card.layouts[0], card.layouts[0], card.trained_in.id)
-        model = build_model(settings, envs, card.seed, logs)
+        model = self._new_model(envs, card)
         try:
             cast("Any", model.policy).load_state_dict(source.model.policy.state_dict())
         except RuntimeError as error:

@@ -212,10 +212,7 @@ def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
 
 
 def _column(
-    feature: Feature,
-    limb_of: dict[str, int],
-    limb_of_body: dict[str, int],
-    trunk: tuple[str, ...],
+    feature: Feature, limb_of: dict[str, int], limb_of_body: dict[str, int], trunk: tuple[str, ...]
 ) -> tuple[int, str]:
     """Return the row of a feature, and the name of its column.
 

@@ -52,7 +52,14 @@ class FrozenTrunk(Method):
         return run.fine_tune(callback=_Freeze())
 
 
-class _Freeze(BaseCallback):
+class _AtStart(BaseCallback):
+    """Acts before the first step only."""
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class _Freeze(_AtStart):
     """Excludes the hidden layers after the first from the optimiser's steps."""
 
     def _on_training_start(self) -> None:
@@ -60,9 +67,6 @@ class _Freeze(BaseCallback):
         linear = [layer for layer in hidden if isinstance(layer, nn.Linear)]
         for layer in linear[1:]:
             layer.requires_grad_(False)
-
-    def _on_step(self) -> bool:
-        return True
 
 
 # Weight of the distillation at the start, and the share of the steps after which it is 0.
@@ -287,7 +291,7 @@ def _mapped(seen: Transitions, body_map: BodyMap) -> Transitions:
     )
 
 
-class _Prefill(BaseCallback):
+class _Prefill(_AtStart):
     """Fills the replay buffer before the first step."""
 
     def __init__(self, transitions: Transitions, action: Layout) -> None:
@@ -309,9 +313,6 @@ class _Prefill(BaseCallback):
             model.replay_buffer.add(
                 seen, then, model.policy.scale_action(inside), rewards, ended, [{}] * together
             )
-
-    def _on_step(self) -> bool:
-        return True
 
 
 class DomainClassifiers(nn.Module):

@@ -40,11 +40,7 @@ _MAX_ARGUMENT_LENGTH: Final = 40
 _ARMS: Final = {"random": "random actions", "source": "source policy, in the source"}
 
 
-def study_html(
-    study: Study,
-    pictures: Pictures | None = None,
-    picture_note: str = "",
-) -> str:
+def study_html(study: Study, pictures: Pictures | None = None, picture_note: str = "") -> str:
     """Render the report of a study."""
     from shapechanger.transfer.report.curves import learning_curves  # Matplotlib.
 

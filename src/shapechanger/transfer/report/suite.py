@@ -13,14 +13,13 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
 from shapechanger.reports.numbers import count, number
 from shapechanger.reports.page import render
-from shapechanger.transfer.metrics import (
+from shapechanger.transfer.metrics.curves import Reference
+from shapechanger.transfer.metrics.intervals import (
     Estimate,
-    Reference,
     interquartile_mean,
-    jumpstart,
     probability_of_improvement,
-    total_reward_gain,
 )
+from shapechanger.transfer.metrics.measures import jumpstart, total_reward_gain
 from shapechanger.transfer.report.study import argument_text
 from shapechanger.transfer.report.verdict import (
     direction,

@@ -19,7 +19,8 @@ from shapechanger.reports.numbers import (
     spread_text,
 )
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.metrics import Estimate, ReachTimes, Summary, TimeToThreshold
+from shapechanger.transfer.metrics.intervals import Estimate
+from shapechanger.transfer.metrics.measures import ReachTimes, Summary, TimeToThreshold
 from shapechanger.transfer.plan import NO_SKILL, SOURCE
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study

@@ -201,9 +201,7 @@ def transplant(
 
 
 def _sensed(
-    body_map: BodyMap,
-    source: RunningMeanStd | VecNormalize | None,
-    target: VecNormalize | None,
+    body_map: BodyMap, source: RunningMeanStd | VecNormalize | None, target: VecNormalize | None
 ) -> Affine:
     """Map the target network's inputs to the source's; set the target's statistics."""
     statistics = cast("RunningMeanStd | None", source)
