@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, MapEntry, Rule, Zero
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, MapEntry, Zero
+from shapechanger.transfer.body_map.rules import Rule
 
 # A fixed number of examples.
 law = settings(max_examples=25)

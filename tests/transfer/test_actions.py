@@ -20,8 +20,8 @@ from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.export import export_onnx
-from shapechanger.transfer.learners.algorithms import SpacesOnly
 from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.policy_file import SpacesOnly
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import Sb3Settings

@@ -8,17 +8,6 @@ from __future__ import annotations
 
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
-from shapechanger.transfer.learners.presets import LEARNERS
-from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask
 
-__all__ = [
-    "LEARNERS",
-    "BodyMap",
-    "EnvRef",
-    "MappedEnv",
-    "Plan",
-    "PpoSettings",
-    "TransferTask",
-    "layouts_of",
-]
+__all__ = ["BodyMap", "EnvRef", "MappedEnv", "Plan", "TransferTask", "layouts_of"]

@@ -122,11 +122,9 @@ class Executor:
             )
 
     def _open(self, on_progress: OnProgress) -> None:
-        """Get ready for jobs."""
         del on_progress
 
     def _begin(self, job: Job) -> None:
-        """Start a job."""
         raise NotImplementedError
 
     def _events(self) -> Iterable[Event]:

@@ -111,11 +111,8 @@ class _MeanActions(nn.Module):
             deviation = np.sqrt(np.asarray(statistics.var, np.float64) + EPSILON)
             _constant(self, mean=np.asarray(statistics.mean, np.float64), deviation=deviation)
         _constant(self, low=space.low.astype(np.float32), high=space.high.astype(np.float32))
-        scale = {
-            name: side.astype(np.float32)
-            for name, side in ActionScale.between(space, policy.card.layouts[1])._asdict().items()
-        }
-        _constant(self, **{f"env_{name}": side for name, side in scale.items()})
+        scale = ActionScale.between(space, policy.card.layouts[1])._asdict()
+        _constant(self, **{f"env_{n}": side.astype(np.float32) for n, side in scale.items()})
 
     def forward(self, *given: Tensor) -> Tensor:
         """Return actions, shape (n, actions), in the units of the env, for observations."""
@@ -133,8 +130,6 @@ class _MeanActions(nn.Module):
 
 
 class _LimbActions(nn.Module):
-    """The actions of a policy of limbs for one body."""
-
     def __init__(self, policy: Any, rows: LimbRows) -> None:
         super().__init__()
         self.network = policy.actor_net

@@ -46,11 +46,6 @@ class RayCluster(Executor):
         self._address = address
 
     def _open(self, on_progress: OnProgress) -> None:
-        """Connect to the cluster.
-
-        Raises:
-            StudyError: If it does not answer.
-        """
         del on_progress
         self._is_own = not _ray.is_initialized()
         if self._is_own:
@@ -112,22 +107,17 @@ def _no_answer(address: str, reason: str) -> StudyError:
 
 
 class _Board:
-    """Holds the steps of each job: a Ray actor."""
-
     def __init__(self) -> None:
         self._steps: dict[str, int] = {}
 
     def put(self, name: str, steps: int) -> None:
-        """Store the steps of a job."""
         self._steps[name] = steps
 
     def take(self) -> dict[str, int]:
-        """Return the steps of every job that has changed since the last call."""
         steps, self._steps = self._steps, {}
         return steps
 
 
 def _perform(function: Any, arguments: tuple[Any, ...], name: str, board: Any) -> Any:
-    """Perform a job on a node."""
     report = throttled(lambda steps: board.put.remote(name, steps), _REPORT_EVERY_S)
     return failure_of(function, arguments, report)

@@ -139,7 +139,7 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         )
         if run.kind == SOURCE:
             policy = context.train(
-                context.source, context.source_steps, on_evaluation=context.report
+                plan.task.source, context.source_steps, on_evaluation=on_evaluation
             )
         else:
             policy = load_method(run.kind).learn(context)
@@ -154,7 +154,6 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
 
 
 def _evaluate_unskilled(plan: Plan, run: Run, learner: Learner[Any]) -> Evaluation:
-    """Evaluate random actions, or the action zero, in the target."""
     with ExitStack() as stack:
         envs = learner.evaluation_envs(plan.target_of(run))
         for env in envs:

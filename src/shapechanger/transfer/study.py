@@ -221,12 +221,9 @@ def make_plan(
                 )
             own_steps = settings.whole_updates(own_steps)
         source_budget, digest = origin.steps, _digest(source_policy)
-    layouts = (
-        traits.source.observation_layout,
-        traits.target.observation_layout,
-        traits.source.action_layout,
-        traits.target.action_layout,
-    )
+    one, other = traits.source, traits.target
+    seen = one.observation_layout, other.observation_layout
+    layouts = (*seen, one.action_layout, other.action_layout)
     return Plan(
         task=task,
         body_map=(
@@ -387,12 +384,10 @@ def claim_folder(plan: Plan, out: Path) -> None:
 
 
 def _digest(policy: Path) -> str:
-    """SHA-256 of a file."""
     return hashlib.sha256(policy.read_bytes()).hexdigest()
 
 
 def _summaries(study: Study) -> dict[str, Summary]:
-    """Compare each arm of a study with scratch."""
     plan = study.plan
     curves = {kind: study.curves(kind) for kind in (*NO_SKILL, *plan.arms)}
     scratch = curves["scratch"]

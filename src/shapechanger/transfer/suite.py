@@ -100,7 +100,6 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
 
 
 def _share(plan: Plan, folder: Path, sibling: Path) -> None:
-    """Copy the runs of another study that are the same here."""
     remedy = f"delete {sibling} to repeat that study"
     other = read_plan(sibling, remedy)
     if text := changes_between(other, plan):
@@ -133,7 +132,6 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
 
 
 def _copy_atomic(theirs: Path, mine: Path) -> None:
-    """Copy the folder of a run atomically."""
     part = mine.with_name(f".{mine.name}.part")
     make_folder(mine.parent)
     try:

@@ -8,7 +8,8 @@ import pytest
 
 from shapechanger.errors import MapError, UnknownName
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, Rule, RuleLike, Zero
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, Zero
+from shapechanger.transfer.body_map.rules import Rule, RuleLike
 from tests.transfer.body_map.bodies import (
     DEGREE,
     GROWN,

@@ -34,8 +34,6 @@ RISING = LearningCurves(STEPS, np.array([[0.0, 0.5, 1.0], [1.0, 0.5, 0.0]]))
         ([0.0, 1.0], [[1.0, np.inf]], "returns must be finite"),
         ([0.0, 1.0], [[1.0, 1e300]], "returns must be finite"),
         ([0.0, np.inf], [[1.0, 2.0]], "steps must be finite"),
-        ([0.0, 1.0], [["high", "low"]], "array of numbers"),
-        ([0.0, 1.0], [[1.0], [1.0, 2.0]], "array of numbers"),
     ],
 )
 def test_bad_curves_are_refused(steps: object, returns: object, message: str) -> None:
@@ -166,13 +164,6 @@ def test_a_reference_is_the_best_floor_and_the_best_end() -> None:
     floors = {"random actions": -10.0, "the zero action": 997.0, "untrained policies": 994.0}
     reference = Reference.of(floors, {"scratch": 1100.0, "fine-tune": 1500.0})
     assert reference == Reference(997.0, 1500.0, "the zero action", "fine-tune")
-
-
-def test_a_reference_needs_both_ends() -> None:
-    with pytest.raises(StudyError, match="needs a floor"):
-        Reference.of({}, {"scratch": 1.0})
-    with pytest.raises(StudyError, match="needs a floor"):
-        Reference.of({"random actions": 1.0}, {})
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])

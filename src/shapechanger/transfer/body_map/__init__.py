@@ -16,21 +16,7 @@ array([0.5, 0.5])
 """
 
 from shapechanger.transfer.body_map.envs import MappedEnv, body_map
-from shapechanger.transfer.body_map.map import BodyMap, MapRow
-from shapechanger.transfer.body_map.matching import Units
-from shapechanger.transfer.body_map.rules import Copy, Hold, Learn, MapEntry, Rule, RuleLike, Zero
+from shapechanger.transfer.body_map.map import BodyMap
+from shapechanger.transfer.body_map.rules import Copy, Hold, Learn, MapEntry, Zero
 
-__all__ = [
-    "BodyMap",
-    "Copy",
-    "Hold",
-    "Learn",
-    "MapEntry",
-    "MapRow",
-    "MappedEnv",
-    "Rule",
-    "RuleLike",
-    "Units",
-    "Zero",
-    "body_map",
-]
+__all__ = ["BodyMap", "Copy", "Hold", "Learn", "MapEntry", "MappedEnv", "Zero", "body_map"]

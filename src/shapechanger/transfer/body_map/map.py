@@ -340,9 +340,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
 
     def __repr__(self) -> str:
         """Count the rules by kind."""
-        return (
-            f"BodyMap(observation: {_counted(self.observation)}; action: {_counted(self.action)})"
-        )
+        sides = ([type(e.rule).__name__ for e in side] for side in (self.observation, self.action))
+        return "BodyMap(observation: {}; action: {})".format(*(dict(Counter(s)) for s in sides))
 
     def to_json(self) -> str:
         """Write the map with its four layouts as JSON."""
@@ -397,8 +396,3 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
     @cached_property
     def _action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return self.target_action.low, self.target_action.high
-
-
-def _counted(entries: tuple[MapEntry, ...]) -> str:
-    counts = Counter(type(entry.rule).__name__ for entry in entries)
-    return ", ".join(f"{number} {kind}" for kind, number in counts.items()) or "none"

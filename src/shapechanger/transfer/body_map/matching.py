@@ -134,7 +134,6 @@ def constant_rule(like: RuleLike, feature: Feature) -> Rule:
 
 
 def _read(like: RuleLike, pattern: str, feature: Feature, side: Side, units: Units) -> Rule:
-    """Read the rule of `pattern` for `feature`."""
     match like:
         case Copy(name, scale):
             pass
@@ -236,7 +235,6 @@ def read_toml(text: str) -> MapText:
 
 
 def _rule(name: str, value: object) -> RuleLike:
-    """Parse the value of a rule."""
     if isinstance(value, str):
         if not value.startswith(_COPY):
             _one_of(name, value, _WORDS)
@@ -254,7 +252,6 @@ def _rule(name: str, value: object) -> RuleLike:
 
 
 def _as(name: str, value: object, kind: type[_Read]) -> _Read:
-    """Convert a value to its type."""
     try:
         return msgspec.convert(value, type=kind)
     except msgspec.ValidationError as error:
@@ -316,7 +313,6 @@ def _fitting(glob: str, elements: tuple[str, ...]) -> list[str]:
 def _reflected(
     feature: Feature, layout: Layout, partners: Mapping[str, str], flipped: frozenset[str]
 ) -> MapEntry:
-    """Return the entry that fills a feature of the mirrored body."""
     if feature.shape:
         raise MapError(f"{feature.name!r} is a block of numbers, which cannot be mirrored by name.")
     element, *path = feature.name.split("/", 1)
@@ -330,7 +326,6 @@ def _reflected(
 
 
 def _check_pair(feature: Feature, partner: Feature, scale: float) -> None:
-    """Refuse two features that cannot swap."""
     for aspect in ("unit", "shape", "gain", "gain_unit"):
         ours, theirs = getattr(feature, aspect), getattr(partner, aspect)
         if ours != theirs:

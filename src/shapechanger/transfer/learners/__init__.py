@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from shapechanger.transfer.body_map import BodyMap
     from shapechanger.transfer.learners.evaluation import Evaluation
 
-__all__ = ["Learner", "LearnerSettings", "SharedFile", "Takes", "ignore"]
-
 Takes = Literal[
     "trial", "on-policy", "off-policy", "callback", "demonstrations", "many bodies", "device"
 ]
@@ -93,13 +91,12 @@ class LearnerSettings:
         """Describe the evaluations and the training data, such as "every 10 steps."."""
         return f"every {self.eval_every:,} steps."
 
-    def require_budget(self, steps: int, which: str = "", option: str = "") -> None:
+    def require_budget(self, steps: int, which: str = "") -> None:
         """Refuse a budget that ends before the first evaluation.
 
         Args:
             steps: The budget.
             which: "target" or "source", if there are two budgets.
-            option: The option that sets the budget, if the user has not.
 
         Raises:
             StudyError: If it does.
@@ -108,7 +105,7 @@ class LearnerSettings:
             budget = f"{steps} {which} steps" if which else f"{steps} steps"
             raise StudyError(
                 f"A budget of {budget} is smaller than one evaluation, which comes every "
-                f"{self.eval_every} steps: give at least that{option and f' as {option}'}."
+                f"{self.eval_every} steps: give at least that."
             )
 
 

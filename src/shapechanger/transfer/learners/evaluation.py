@@ -127,8 +127,6 @@ def _means(episodes: Sequence[dict[str, float]]) -> dict[str, float]:
 
 @dataclass(slots=True)
 class _Episode:
-    """Sums over one episode."""
-
     total: float = 0.0
     length: int = 0
     terms: dict[str, float] = field(default_factory=dict[str, float])
@@ -160,7 +158,6 @@ class _Episode:
 
 
 def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episode]:
-    """Run one episode in each env in parallel."""
     observations = np.stack([env.reset(seed=seed + i)[0] for i, env in enumerate(envs)])
     episodes, alive = [_Episode() for _ in envs], list(range(len(envs)))
     measures = [measure for measure in measures_of(envs[0]) if measure.key]

@@ -7,9 +7,13 @@ older versions the two are equal.
 
 from __future__ import annotations
 
+import inspect
+import pkgutil
 import random
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -20,15 +24,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import MissingExtra, PolicyError, no_policy_file
+from shapechanger.errors import MissingExtra, PolicyError, StudyError, UnknownName, no_policy_file
 from shapechanger.layout import Layout
 from shapechanger.policy import Policy, PolicyCard
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import Identities
 from shapechanger.transfer.learners import LearnerSettings
-from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
-from shapechanger.transfer.learners.settings import OffPolicySettings, PpoSettings, Sb3Settings
+from shapechanger.transfer.learners.settings import (
+    ImportedSettings,
+    OffPolicySettings,
+    PpoSettings,
+    Sb3Settings,
+)
 from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 from shapechanger.transfer.transplant.model import check_supported
 
@@ -41,7 +49,7 @@ try:
     from stable_baselines3.common.running_mean_std import RunningMeanStd
     from stable_baselines3.common.save_util import load_from_zip_file
     from stable_baselines3.common.torch_layers import FlattenExtractor
-    from stable_baselines3.common.vec_env import DummyVecEnv
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
     from torch import nn
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
@@ -49,6 +57,11 @@ except ImportError as error:
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Act
 
+_SHIPPED: Final[dict[str, type[BaseAlgorithm]]] = {"PPO": PPO, "SAC": SAC, "TQC": TQC}
+# Packages that a file may name; importing any other could run any code.
+_FILES_MAY_IMPORT: Final = ("stable_baselines3", "sb3_contrib")
+# Arguments that are not settings.
+_GIVEN: Final = ("self", "policy", "env", "envs", "seed", "_init_setup_model")
 _WEIGHTS: Final = "policy."
 _STATISTICS: Final = "normalisation."
 _SPACES: Final = "spaces."
@@ -238,6 +251,96 @@ def _read_statistics(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
 
     size = card.layouts[0].size
     return Normalisation(statistics("observation", (size,)), statistics("reward", ()))
+
+
+def build_model(
+    settings: Sb3Settings, envs: VecEnv, seed: int, tensorboard: str | None = None
+) -> BaseAlgorithm:
+    """Build an untrained model on the CPU."""
+    made = _load(settings.algorithm)
+    arguments = dict(settings.model_arguments)
+    try:
+        if _is_class(made):
+            arguments.setdefault("policy_kwargs", {"net_arch": list(settings.net_arch)})
+            arguments |= {"seed": seed, "device": "cpu", "tensorboard_log": tensorboard}
+            policy: Any = settings.policy_class
+            if ":" in policy:
+                policy = pkgutil.resolve_name(policy)
+            return made(policy, envs, **arguments)
+        model = made(envs, seed, **arguments)
+    except (TypeError, ValueError, AssertionError) as error:
+        if settings.algorithm in _SHIPPED:
+            raise
+        raise StudyError(f"{settings.algorithm} refuses its arguments: {error}.") from error
+    if not isinstance(model, BaseAlgorithm):
+        raise StudyError(
+            f"{settings.algorithm} returned {type(model).__name__}: it must return a model of "
+            "Stable-Baselines3."
+        )
+    return model
+
+
+def _is_class(algorithm: object) -> bool:
+    return isinstance(algorithm, type) and issubclass(algorithm, BaseAlgorithm)
+
+
+def require_class(algorithm: str) -> None:
+    """Refuse the name of an algorithm that is not a class of models, before importing it."""
+    module = algorithm.partition(":")[0]
+    own = algorithm not in _SHIPPED and module not in sys.modules
+    if own and module.partition(".")[0] not in _FILES_MAY_IMPORT:
+        raise PolicyError(
+            f"A policy of {algorithm} needs the module {module}, which a file may not import: "
+            f"name it too, as load_policy(path, {algorithm!r}) or --learner {algorithm}."
+        )
+    try:
+        known = _is_class(_load(algorithm))
+    except UnknownName as error:
+        raise ValueError(f"its algorithm {algorithm} cannot be imported") from error
+    if not known:
+        raise ValueError(f"its algorithm {algorithm} is a function, which a file may not call")
+
+
+def checked_settings(settings: ImportedSettings) -> ImportedSettings:
+    """Import an algorithm, check the names of its arguments, and fill in how often it updates."""
+    made = _load(settings.algorithm)
+    if not callable(made) or (isinstance(made, type) and not _is_class(made)):
+        raise StudyError(
+            f"{settings.algorithm} is neither a class of models nor a function that builds one."
+        )
+    takes = inspect.signature(made).parameters
+    known = [name for name in takes if name not in _GIVEN]
+    anything = any(each.kind is each.VAR_KEYWORD for each in takes.values())
+    for name in settings.arguments:
+        if name not in known and not anything:
+            raise UnknownName(f"setting of {settings.algorithm}", name, known)
+    for name in ("n_steps", "train_freq"):
+        # Off-policy algorithms have both, and their `n_steps` counts the steps of a return.
+        if name == "n_steps" and "buffer_size" in takes:
+            continue
+        default: Any = takes[name].default if name in takes else None
+        every = settings.arguments.get(name, default)
+        if isinstance(every, int):
+            return msgspec.structs.replace(settings, steps_per_update=every)
+    return settings
+
+
+def _load(algorithm: str) -> Any:
+    if algorithm in _SHIPPED:
+        return _SHIPPED[algorithm]
+    module, _, name = algorithm.partition(":")
+    try:
+        return getattr(import_module(module), name)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise UnknownName("algorithm", algorithm, _SHIPPED) from error
+
+
+class SpacesOnly(gym.Env[Any, Any]):
+    """An env that has spaces and cannot be stepped, for models that only act."""
+
+    def __init__(self, observation_space: gym.Space[Any], action_space: gym.Space[Any]) -> None:
+        self.observation_space = observation_space
+        self.action_space = action_space
 
 
 def convert_zip(

@@ -128,7 +128,7 @@ def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, LearnerS
 
 
 def _imported(algorithm: str, changed: Mapping[str, Any]) -> ImportedSettings:
-    from shapechanger.transfer.learners.algorithms import checked_settings  # PyTorch.
+    from shapechanger.transfer.learners.policy_file import checked_settings  # PyTorch.
 
     ours = {field.name for field in msgspec.structs.fields(ImportedSettings)}
     own = {name: value for name, value in changed.items() if name in ours}

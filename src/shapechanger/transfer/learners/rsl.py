@@ -22,7 +22,7 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.registry import MAKERS
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
-from shapechanger.transfer.learners.algorithms import SpacesOnly
+from shapechanger.transfer.learners.policy_file import SpacesOnly
 from shapechanger.transfer.learners.sb3 import Progress, Sb3Learner
 
 try:
@@ -176,7 +176,6 @@ class RslLearner(Sb3Learner):
         return env, None
 
     def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> RslTraining:
-        """Return the training on worlds of `_worlds`."""
         del rows
         return RslTraining(RslVecEnv(worlds, seed), model, statistics, self.settings)
 
@@ -201,12 +200,7 @@ class _Returns:
             )
 
     def scaled(self, rewards: Tensor, ends: Tensor) -> Tensor:
-        """Return the rewards of a step, shape (n,), divided by the deviation of the returns.
-
-        Args:
-            rewards: Shape (n,).
-            ends: Whose episodes have ended, shape (n,).
-        """
+        """Return the rewards of a step, (n,), over the deviation of the returns; `ends`: (n,)."""
         if self._statistics is None:
             return rewards
         self._returns = self._returns * self._gamma + rewards
@@ -222,7 +216,6 @@ class _Returns:
         return (rewards / scale).clamp(-_CLIPPED_REWARD, _CLIPPED_REWARD).to(rewards.dtype)
 
     def write_back(self) -> None:
-        """Give the statistics the present numbers."""
         if self._statistics is not None:
             found: Any = self._statistics.ret_rms
             found.mean, found.var = self._mean.cpu().numpy(), self._var.cpu().numpy()
@@ -302,7 +295,6 @@ class RslTraining:
         self._ppo.update()
 
     def _pairs(self) -> list[tuple[Any, Any]]:
-        """Pair the modules of rsl-rl's networks with those in Stable-Baselines3's policy."""
         policy = self._model.policy
         extractor = policy.mlp_extractor
         pairs: list[tuple[Any, Any]] = []

@@ -21,9 +21,13 @@ from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import identities_in
 from shapechanger.transfer.learners import Learner, ignore
-from shapechanger.transfer.learners.algorithms import build_model
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluate, evaluation_seed
-from shapechanger.transfer.learners.policy_file import Normalisation, TrainedPolicy, actor
+from shapechanger.transfer.learners.policy_file import (
+    Normalisation,
+    TrainedPolicy,
+    actor,
+    build_model,
+)
 from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.learners.vec_env import training_vec_env, with_scaled_actions
 from shapechanger.transfer.transplant import transplant
@@ -186,7 +190,6 @@ class Sb3Learner(Learner[Sb3Settings]):
     def _adapted(
         self, envs: list[gym.Env[Any, Any]], policy: TrainedPolicy, body_map: BodyMap
     ) -> list[gym.Env[Any, Any]]:
-        """Return envs as a policy of another body senses them."""
         del policy
         return [MappedEnv(one, body_map) for one in envs]
 
@@ -228,7 +231,6 @@ class Sb3Learner(Learner[Sb3Settings]):
         )
 
     def _require_finite(self, model: BaseAlgorithm) -> None:
-        """Refuse a model whose weights are not all finite."""
         weights = cast("Any", model.policy).state_dict().values()
         if not all(torch.isfinite(one).all() for one in weights):
             raise StudyError(
@@ -238,12 +240,7 @@ class Sb3Learner(Learner[Sb3Settings]):
 
 
 def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] | None:
-    """Raise standard deviations that have collapsed to `START_LOG_STD`.
-
-    Returns:
-        Logarithms of the standard deviations that the training starts with; None for policies whose
-        deviation depends on the observation, as SAC's, which their entropy target raises.
-    """
+    """Raise collapsed deviations, and return their logarithms; None if they are no parameter."""
     if not isinstance(model.policy, ActorCriticPolicy):
         return None
     log_std: torch.Tensor = model.policy.log_std

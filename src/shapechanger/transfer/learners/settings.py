@@ -269,10 +269,9 @@ def study_budgets(
     wanted = settings.steps if steps is None else steps
     settings.require_budget(wanted, "target")
     budget = settings.whole_updates(wanted)
-    option = "source_steps" if source_steps is None else ""
     before = source_steps
     if before is None:
         before = settings.source_steps or settings.whole_updates(budget // 2)
     if not is_given or source_steps:
-        settings.require_budget(before, "source", option)
+        settings.require_budget(before, "source")
     return budget, settings.whole_updates(before)

@@ -57,7 +57,6 @@ class DeviceRows:
         return parts if self._apart else self._gathered(parts)
 
     def _gathered(self, parts: list[Tensor]) -> Tensor:
-        """Return rows of all batches in the order of the worlds."""
         count = sum(len(part) for part in parts)
         whole = parts[0].new_empty((count, parts[0].shape[1]))
         for (numbers, _), part in zip(self._batches, parts, strict=True):

@@ -28,7 +28,6 @@ _CORE = 128
 
 
 def _layers(*widths: int) -> nn.Sequential:
-    """Return linear layers with tanh between them."""
     layers: list[nn.Module] = []
     for before, after in pairwise(widths):
         layers += [nn.Linear(before, after), nn.Tanh()]

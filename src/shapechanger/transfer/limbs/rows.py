@@ -23,10 +23,8 @@ _Floats = NDArray[np.float64]
 
 NUMBERS: Final = 22
 """Columns of a row for the numbers that describe a trunk or a limb."""
-
 DESCRIBED: Final = 2 + NUMBERS
 """Columns of a row before the sensed ones: it exists, it has a motor, and the numbers."""
-
 # Brings each number of a row to about 1: runners turn their joints at about 10 rad/s and move at 3
 # m/s. Contact forces are clipped to 1 by the envs.
 _SCALES: Final = {"rad/s": 0.1, "m/s": 0.3}
@@ -234,7 +232,6 @@ def _column(
 
 
 def _scaling(feature: Feature) -> tuple[float, float]:
-    """Return factor and offset that bring a feature to about -1 to 1."""
     finite = np.isfinite(feature.low) and np.isfinite(feature.high)
     if finite and feature.unit in ("rad", "m") and feature.high > feature.low:
         half = 0.5 * (feature.high - feature.low)

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from shapechanger.transfer.body_map import BodyMap
     from shapechanger.transfer.learners.evaluation import Evaluation
 
-__all__ = ["Method", "MethodRun", "load_method", "register"]
-
 
 @dataclass(kw_only=True)
 class MethodRun:
@@ -195,7 +193,6 @@ class Method:
             raise self._lacks("two bodies of one family, such as two ants")
 
     def _lacks(self, needed: str) -> StudyError:
-        """Return the error for a study without what the method needs."""
         return StudyError(f"{self.name} needs {needed}: leave this arm out.")
 
     def learn(self, run: MethodRun) -> Any:

@@ -148,7 +148,6 @@ class _Distillation(BaseCallback):
         return cast("Any", self.model)._last_obs
 
     def _distil(self, seen: NDArray[Any], shown: NDArray[np.float32]) -> None:
-        """Take one pass over a rollout."""
         model = cast("Any", self.model)
         weight = _WEIGHT * (1.0 - self.num_timesteps / (_UNTIL * model._total_timesteps))
         if weight <= 0.0:
@@ -292,8 +291,6 @@ def _mapped(seen: Transitions, body_map: BodyMap) -> Transitions:
 
 
 class _Prefill(_AtStart):
-    """Fills the replay buffer before the first step."""
-
     def __init__(self, transitions: Transitions, action: Layout) -> None:
         super().__init__()
         self._transitions = transitions
@@ -366,12 +363,9 @@ class DomainClassifiers(nn.Module):
 
 
 class _CorrectedReplay(ReplayBuffer):
-    """A replay buffer that adds the present correction to the rewards that it returns."""
-
     classifiers: DomainClassifiers
 
     def sample(self, batch_size: int, env: Any = None) -> ReplayBufferSamples:
-        """Sample transitions with corrected rewards."""
         batch = super().sample(batch_size, env)
         extra = self.classifiers.correction(
             batch.observations, batch.actions, batch.next_observations
@@ -393,7 +387,6 @@ class _Correction(BaseCallback):
         self._steps = 0
 
     def close(self) -> None:
-        """Close the target's envs."""
         for one in (self._env, *self._judges):
             one.close()
 
@@ -431,7 +424,6 @@ class _Correction(BaseCallback):
         self._evaluate_if_due(last=True)
 
     def _act(self) -> None:
-        """Take one step on the target with the policy's exploration noise."""
         model = cast("Any", self.model)
         action, _ = model.predict(self._seen)
         scale = ActionScale.between(model.action_space, self._action)

@@ -155,10 +155,7 @@ def check_comparable(arm: LearningCurves, scratch: LearningCurves) -> None:
 
 def _frozen_copy(name: str, numbers: ArrayLike) -> NDArray[np.float64]:
     """Return a read-only float copy of finite numbers."""
-    try:
-        copy = np.array(numbers, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise StudyError(f"{name} must be an array of numbers: {error}.") from error
+    copy = np.array(numbers, dtype=np.float64)
     if not np.all(np.abs(copy) <= _LARGEST_RETURN):  # Also refuses NaN.
         raise StudyError(f"{name} must be finite numbers, at most {_LARGEST_RETURN:g}.")
     copy.setflags(write=False)
@@ -214,12 +211,7 @@ class Reference(msgspec.Struct, frozen=True):
             floors: Mean values of the policies without skill, keyed by name; at least one.
             ends: Mean values at the end of each arm, keyed by name; at least one.
             shipped: Name and value of the target's own reference; None if it has none.
-
-        Raises:
-            StudyError: If `floors` or `ends` is empty.
         """
-        if not floors or not ends:
-            raise StudyError("A reference needs a floor and the end of an arm.")
         zero_of, one_of = max(floors, key=floors.__getitem__), max(ends, key=ends.__getitem__)
         name, value = shipped or (one_of, ends[one_of])
         return cls(floors[zero_of], value, zero_of, name, shipped is not None)

@@ -152,7 +152,6 @@ def _ratio(
 
 
 def _squared_error(sample: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Squared standard error of the mean along the last axis."""
     return np.asarray(sample.var(axis=-1, ddof=1)) / sample.shape[-1]
 
 

@@ -4,7 +4,8 @@ Source of the five: M. E. Taylor and P. Stone, "Transfer Learning for Reinforcem
 Domains: A Survey", JMLR 10 (2009) 1633-1685, section 2.
 
 p is the mean curve over seeds and H the horizon. Every function takes the arm in target steps or,
-through `in_total_steps`, in total steps. Positive differences mean that transfer helped.
+through `in_total_steps`, in total steps, and raises a StudyError if the curves of the arm and of
+scratch cannot be compared. Positive differences mean that transfer helped.
 """
 
 from __future__ import annotations
@@ -32,9 +33,7 @@ from shapechanger.transfer.metrics.intervals import (
 )
 
 _NO_CURVE: Final = "Undefined: it needs a learning curve, and there is one evaluation only."
-
 _NOT_TRAINED: Final = "The arm is not trained on the target: its one evaluation stands for its end."
-
 # An area of scores below this is zero up to rounding.
 _ZERO_AREA: Final = 1e-9
 
@@ -49,9 +48,6 @@ def jumpstart(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
     Args:
         arm: Curves of the arm; one evaluation is enough.
         scratch: Curves of the baseline, evaluated at the same steps.
-
-    Raises:
-        StudyError: If the curves cannot be compared.
     """
     check_comparable(arm, scratch)
     return estimate_difference(arm.returns[:, 0], scratch.at(arm.source_steps)[:, 0])
@@ -92,9 +88,6 @@ def total_reward_gain(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
     Args:
         arm: Curves of the arm.
         scratch: Curves of the baseline, evaluated at the same steps.
-
-    Raises:
-        StudyError: If the curves cannot be compared.
     """
     check_comparable(arm, scratch)
     if arm.n_evals == 1:
@@ -115,9 +108,6 @@ def auc_ratio(
         arm: Scores of the arm.
         scratch: Scores of the baseline, evaluated at the same steps.
         rng: Draws the resamples.
-
-    Raises:
-        StudyError: If the curves cannot be compared.
     """
     check_comparable(arm, scratch)
     if arm.n_evals == 1:

@@ -15,8 +15,6 @@ import msgspec
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import UnknownName
 
-__all__ = ["FOLDER", "EnvReference", "load_references", "reference_of", "reference_policy"]
-
 FOLDER: Final = Path(__file__).parent
 """Folder of the references and of their policies."""
 

@@ -12,20 +12,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.reports.charts import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PANEL,
-    PINK,
-    PURPLE,
-    SKY,
-    WIDE,
-    YELLOW,
-    svg_chart,
-)
+from shapechanger.reports import charts
 from shapechanger.reports.numbers import t_interval
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.report.verdict import finals
@@ -35,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shapechanger.transfer.study import Study
-
 
 # An interval of two seeds may reach ten times as far as they lie apart.
 _BAND_SEEDS: Final = 3
@@ -52,30 +38,27 @@ class _LineStyle(NamedTuple):
 
 
 _LINE_STYLES: Final[dict[str, _LineStyle]] = {
-    "scratch": _LineStyle(BLUE, "-", "o"),
-    "fine-tune": _LineStyle(ORANGE, "-", "s"),
-    "zero-shot": _LineStyle(GREEN, "--", ""),
-    "randomised": _LineStyle(PINK, "-.", ""),
-    "identified": _LineStyle(PURPLE, (0, (6, 2)), ""),
-    "frozen-trunk": _LineStyle(SKY, "-.", "^"),
-    "rehearsal": _LineStyle(SKY, "-", "P"),
-    "kickstart": _LineStyle(YELLOW, "-", "v"),
-    "evolution": _LineStyle(BLACK, "-", "d"),
-    "generalist": _LineStyle(PURPLE, "-", "*"),
-    "random": _LineStyle(GREY, ":", ""),
+    "scratch": _LineStyle(charts.BLUE, "-", "o"),
+    "fine-tune": _LineStyle(charts.ORANGE, "-", "s"),
+    "zero-shot": _LineStyle(charts.GREEN, "--", ""),
+    "randomised": _LineStyle(charts.PINK, "-.", ""),
+    "identified": _LineStyle(charts.PURPLE, (0, (6, 2)), ""),
+    "frozen-trunk": _LineStyle(charts.SKY, "-.", "^"),
+    "rehearsal": _LineStyle(charts.SKY, "-", "P"),
+    "kickstart": _LineStyle(charts.YELLOW, "-", "v"),
+    "evolution": _LineStyle(charts.BLACK, "-", "d"),
+    "generalist": _LineStyle(charts.PURPLE, "-", "*"),
+    "random": _LineStyle(charts.GREY, ":", ""),
 }
-
-
 # Colours of methods that are not shipped, in their order in the study.
 _OTHER_STYLES: Final = (
-    _LineStyle(YELLOW, (0, (1, 1)), "D"),
-    _LineStyle(BLACK, (0, (4, 1, 1, 1)), "P"),
-    _LineStyle(SKY, (0, (3, 1)), "X"),
+    _LineStyle(charts.YELLOW, (0, (1, 1)), "D"),
+    _LineStyle(charts.BLACK, (0, (4, 1, 1, 1)), "P"),
+    _LineStyle(charts.SKY, (0, (3, 1)), "X"),
 )
 
 
 def _line_style(study: Study, kind: str) -> _LineStyle:
-    """Return the style of a kind of run."""
     if kind in _LINE_STYLES:
         return _LINE_STYLES[kind]
     others = [arm for arm in study.plan.arms if arm not in _LINE_STYLES]
@@ -106,11 +89,12 @@ def learning_curves(study: Study, *countings: Counting) -> dict[Counting, str]:
         axes.yaxis.set_major_formatter(FuncFormatter(tick))
         figure.legend(loc="outside lower center", ncols=2, handlelength=2.5)
 
-    return {each: svg_chart(PANEL, partial(draw, counting=each)) for each in countings}
+    return {
+        each: charts.svg_chart(charts.PANEL, partial(draw, counting=each)) for each in countings
+    }
 
 
 def _draw_arms(axes: Axes, study: Study, source_steps: float) -> None:
-    """Draw all arms; those that start from the source begin at `source_steps`."""
     last = float(study.plan.steps)
     reference = next(iter(study.summaries.values())).reference
     style = _LINE_STYLES["random"]
@@ -171,7 +155,6 @@ def _draw_arm(axes: Axes, study: Study, arm: str, source_steps: float) -> None:
 
 
 def _axis_label(study: Study) -> str:
-    """Return the name of the measure with its unit."""
     unit = "" if study.plan.unit == "1" else f", {study.plan.unit}"
     return f"{study.plan.measure.capitalize()} on the target{unit}"
 
@@ -215,4 +198,4 @@ def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
         axes.set_ylabel(_axis_label(first))
         figure.legend(loc="outside lower center", ncols=3, handlelength=2.5)
 
-    return svg_chart(WIDE, draw)
+    return charts.svg_chart(charts.WIDE, draw)

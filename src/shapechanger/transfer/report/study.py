@@ -51,11 +51,11 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
     return render(
         Path(__file__).with_name("study.html"),
         title=f"{_short_name(plan.task.source)} → {_short_name(plan.task.target)}",
+        study=study,
         plan=plan,
         verdict=verdict(study),
         other_arms=other_arms(study),
         weak=weak_individuals(study),
-        headline_arm=study.headline_arm,
         cards=_cards(study, measures),
         bodies=_bodies(study, pictures) if pictures is not None else [],
         picture_note=picture_note,
@@ -63,7 +63,6 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
         measures=[_measure_table(arm, measures, notes) for arm in study.summaries],
         notes=notes,
         summary=summary,
-        reference=summary.reference,
         number=number,
         caveats=caveats(study),
         good=f"{100.0 * GOOD:.0f} %",
@@ -78,7 +77,6 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
             for row in arms
         ],
         terms=_terms(arms),
-        shift=study.shift,
         map=_body_map(plan.body_map),
         rhythm=plan.settings.rhythm(),
         tuning=tuning_text(plan.learner, plan.task.target.id),
@@ -86,7 +84,6 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
             (name, _setting(value))
             for name, value in msgspec.structs.asdict(cast("Any", plan.settings)).items()
         ],
-        command=study.command,
         machine=machine_text([study]),
         wall_time=_duration(sum(result.wall_s for result in study.runs)),
         runs=[
@@ -274,7 +271,6 @@ def _setting(value: Any) -> str:
 
 
 def _duration(seconds: float) -> str:
-    """Format as seconds, minutes or hours."""
     if seconds < 100.0:
         return f"{number(seconds, 1)} s"
     minutes = seconds / 60.0

@@ -197,11 +197,7 @@ def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
 
 
 def _score_ends(studies: Sequence[Study]) -> dict[str, list[NDArray[np.float64]]]:
-    """Final scores of each arm in studies of one target, whose scale they share.
-
-    0 is the score without skill, as in each study, and 1 the target's reference, or the end of the
-    best arm of all if it has no reference.
-    """
+    """Final scores of each arm in studies of one target; without a reference, 1 is the best end."""
     values = {
         arm: [finals(study, arm) for study in studies if arm in study.plan.arms]
         for arm in dict.fromkeys(arm for study in studies for arm in study.plan.arms)

@@ -74,7 +74,6 @@ def measure_rows(study: Study) -> tuple[MeasureRow, ...]:
 def _measure_row(
     arm: str, measure: str, unit: str, target: Estimate, total: Estimate, *, signed: bool
 ) -> MeasureRow:
-    """One row; what both ways of counting share appears once."""
     sides = (("In target steps", target), ("In total steps", total))
     notes = [f"{where}: {estimate.note}" for where, estimate in sides if estimate.note]
     return MeasureRow(
@@ -320,7 +319,6 @@ def other_arms(study: Study) -> str:
 
 
 def _mean_text(values: NDArray[np.float64], unit: str) -> str:
-    """Format the mean of a measure with its unit."""
     mean = f"{float(f'{values.mean():.3g}'):,.10g}"
     return mean if unit == "1" else f"{mean} {unit}"
 

@@ -214,7 +214,6 @@ def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) 
 
 
 def _names(layout: Layout) -> list[tuple[str, int]]:
-    """For each number the name of its feature and its index in it."""
     return [(feature.name, place) for feature in layout for place in range(feature.size)]
 
 

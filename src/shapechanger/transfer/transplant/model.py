@@ -237,7 +237,6 @@ def _sensed(
 def _gaussian_boundary(
     policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs
 ) -> BoundaryLayers:
-    """Layers of PPO's policy and value network that depend on the body."""
     extractor = policy.mlp_extractor
     layers = (
         *first_linear(extractor.policy_net, "mlp_extractor.policy_net", ["action_net"]),
@@ -250,7 +249,6 @@ def _gaussian_boundary(
 def _squashed_boundary(
     policy: SACPolicy, sensed: Affine, outputs: PolicyOutputs, judged: Affine
 ) -> BoundaryLayers:
-    """Layers of the actor and the critics of SAC and TQC that depend on the body."""
     heads = {"actor.mu": outputs.mean, "actor.log_std": outputs.log_std}
     layers = first_linear(policy.actor.latent_pi, "actor.latent_pi", heads)
     inputs = dict.fromkeys(layers, sensed)
