@@ -52,18 +52,14 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
             )
         )
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
         """Start at a random position near the middle."""
         super().reset(seed=seed)
         self.course = int(self.np_random.integers(HELD_OUT)) + HELD_OUT * self.held_out
         self.place = float(self.np_random.uniform(-0.8, 0.8))
         return self._picture(), {"course": self.course}
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.uint8], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> Any:
         """Move to the side."""
         wind = float(self.np_random.uniform(-0.05, 0.05))
         self.place += self.grip * float(action[0]) + wind

@@ -51,17 +51,13 @@ class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):
     observation_space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
         """Start the episode."""
         assert seed is not None
         self.left = seed
         return np.array([float(self.left)]), {}
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> Any:
         """Count down by one."""
         self.left -= 1
         terms = {"reward_action": float(action[0]), "reward_alive": 1.0}
@@ -102,9 +98,7 @@ class Succeeding(Countdown):
     def __init__(self, successes: list[bool]) -> None:
         self.successes = successes
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> Any:
         """Report the next value."""
         info = {"is_success": self.successes.pop(0)} if self.successes else {}
         return np.zeros(1), 0.0, not self.successes, False, info
@@ -124,9 +118,7 @@ class Runner(Countdown):
     measures = (FORWARD_SPEED,)
     spec = EnvSpec("Runner-v0", max_episode_steps=8)
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> Any:
         observation, _, fallen, truncated, _ = super().step(action)
         info = {"x_velocity": np.float64(2.0), "reward_ctrl": np.float32(-0.5)}
         return observation, -0.5, fallen, truncated, info

@@ -16,7 +16,6 @@ import onnx
 import pytest
 from safetensors import numpy as safetensors
 
-from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.errors import PolicyError
 from shapechanger.finger.task import POLICIES
 from shapechanger.policy import OnnxPolicy, load_policy, save_policy, tensor_bytes
@@ -25,8 +24,6 @@ from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
-from shapechanger.transfer.references import reference_policy
-from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED
 
 
@@ -167,23 +164,6 @@ def test_settings_of_a_stranger_are_refused(
         load_policy(_changed(tmp_path, {"settings": known | settings}))
     assert text in str(refusal.value)
     assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize("kind", [str, Path])
-def test_trained_policies_and_clones_load_from_text_and_path(
-    kind: type[str] | type[Path], tmp_path: Path
-) -> None:
-    trained = load_policy(kind(reference_policy("shapechanger/Ant-v1")))
-    assert isinstance(trained, TrainedPolicy)
-    seen = np.zeros((2, trained.card.observation.size))
-    assert trained.act(seen).shape == (2, 8)
-    save_policy(trained, kind(tmp_path / "again.safetensors"))
-    assert load_policy(kind(tmp_path / "again.safetensors")).card == trained.card
-
-    clone = load_policy(kind(CLONES["car"]))
-    assert isinstance(clone, CameraPolicy)
-    frames = np.zeros((2, 120, 160, 3), np.uint8)
-    np.testing.assert_array_equal(clone.act(frames), clone.predict_many(frames))
 
 
 @pytest.fixture(scope="module")

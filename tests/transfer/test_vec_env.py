@@ -11,7 +11,6 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.transfer.learners.vec_env import ThreadVecEnv, training_vec_env
-from tests.drawing import draws, missing
 from tests.envs.vector.sameness import require_same
 
 _PENDULUM = "shapechanger/InvertedPendulum-v1"
@@ -58,18 +57,6 @@ def test_options_are_each_envs_own() -> None:
     require_same(ours.reset()[1].shape, theirs.reset()[1].shape)
     ours.close()
     theirs.close()
-
-
-@pytest.mark.gl
-def test_pictures_are_tiled() -> None:
-    if not any(draws(library) for library in ("egl", "osmesa", "glfw")):
-        missing("Neither EGL nor OSMesa nor a display works here")
-    envs = ThreadVecEnv(_PENDULUM, 4, render_mode="rgb_array", width=32, height=32)
-    envs.reset()
-    picture = envs.render()
-    assert picture is not None
-    assert picture.shape == (64, 64, 3)
-    envs.close()
 
 
 def test_foreign_envs_use_dummy_vec_env() -> None:

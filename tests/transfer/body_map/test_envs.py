@@ -33,7 +33,7 @@ class Recorder(gym.Env[np.ndarray, np.ndarray]):
         super().reset(seed=seed)
         return self.sensed(), {"options": options}
 
-    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> Any:
         """Record the action."""
         self.moved.append(action)
         return self.sensed(), 2.5, True, False, {"moved": action}

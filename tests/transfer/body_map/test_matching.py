@@ -199,16 +199,3 @@ def test_equal_torque_is_a_scale() -> None:
     assert carts(silent, silent, units="torque").action[0].rule == Copy("slide/motor")
     with pytest.raises(MapError, match="gives 100 N and one of 'slide/motor' 100 N·m"):
         carts(pendulum_action(), pendulum_action(unit="N·m"), units="torque")
-
-
-@pytest.mark.parametrize(("others", "listed"), [(0, ""), (1, " and 1 more"), (2, " and 2 more")])
-def test_features_of_spaces_without_a_common_name_are_listed(others: int, listed: str) -> None:
-    names = [f"a{number}" for number in range(8 + others)]
-    ours, theirs = (Layout(tuple(Feature(f"{side}{name}", "1") for name in names)) for side in "xy")
-    motors = Layout((motor("slide"),))
-    with pytest.raises(MapError) as caught:
-        BodyMap.between(ours, theirs, motors, motors)
-    first = ", ".join(f"x{name}" for name in names[:8])
-    assert f"features are {first}{listed}; the" in str(caught.value)
-    with pytest.raises(MapError, match="the target observation features are"):
-        BodyMap.between(ours, Layout(()), motors, motors)

@@ -55,39 +55,6 @@ def test_the_mirror_of_an_ant() -> None:
     assert moved["ankle_4/motor"] == Copy("ankle_1/motor")
 
 
-def test_a_mirrored_quaternion_is_the_mirrored_rotation() -> None:
-    """R(mirrored q) = S R(q) S with S = diag(1, -1, 1), which is what mirroring a pose means."""
-    q = np.random.default_rng(0).normal(size=4)
-    q /= np.linalg.norm(q)
-    flip = np.diag([1.0, -1.0, 1.0])
-
-    def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        return np.eye(3) + 2 * w * cross + 2 * cross @ cross
-
-    built = ant_mirror()
-    sensed = np.zeros(built.target_observation.size)
-    sensed[1:5] = q
-    mirrored = built.adapt_observation(sensed)[1:5]
-    np.testing.assert_allclose(rotation(*mirrored), flip @ rotation(*q) @ flip, atol=1e-12)
-
-
-def test_the_mirror_of_either_body_gives_the_same_map() -> None:
-    there = BodyMap.between(
-        ant_observation(),
-        ant_observation(feet=True),
-        ant_action(),
-        ant_action(feet=True),
-        rules={"foot_*/motor": "copy ankle_*/motor"},
-    )
-    of_target = BodyMap.mirror(
-        ant_observation(feet=True), ant_action(feet=True), swap=ANT_SWAP, flip=ANT_FLIP
-    )
-    assert there.then(of_target) == ant_mirror().then(there)
-    whys = {entry.why for entry in there.then(of_target).observation}
-    assert whys == {"same name", "symmetry"}
-
-
 MIXED = Layout((Feature("a", "m"), Feature("b", "rad"), Feature("c/x", "m")))
 
 

@@ -95,20 +95,6 @@ def test_limbs_without_a_motor_count_in_no_probability(policy: TrainedPolicy) ->
     assert entropy.item() == pytest.approx(8 * one, rel=1e-5)
 
 
-def test_probabilities_of_drawn_actions(policy: TrainedPolicy) -> None:
-    (env,) = limb_envs(ANT, 1)
-    rows = torch.as_tensor(env.reset(seed=0)[0][None])
-    net = _net(policy)
-    actions, values, drawn = net(rows)
-    again, seen, _ = net.evaluate_actions(rows, actions)
-    assert drawn.item() == pytest.approx(seen.item())
-    assert values.item() == again.item() == net.predict_values(rows).item()
-    mean, _, _ = net(rows, deterministic=True)
-    np.testing.assert_allclose(mean.detach().numpy().clip(-1, 1), policy.act(rows.numpy()))
-    predicted, _ = policy.model.predict(rows.numpy(), deterministic=True)
-    np.testing.assert_allclose(predicted, policy.act(rows.numpy()))
-
-
 def test_a_file_fits_any_body(policy: TrainedPolicy, tmp_path: Path) -> None:
     """A saved policy acts in an ant that has more limbs than any that it was trained in."""
     path = tmp_path / "ants.safetensors"
@@ -146,17 +132,6 @@ def test_training_and_acting_see_the_same_rows(policy: TrainedPolicy) -> None:
     assert policy.normalisation is not None
     assert not policy.normalisation.observation.mean.any()
     assert (policy.normalisation.observation.var == 1.0).all()
-
-
-def test_other_families_are_refused(policy: TrainedPolicy) -> None:
-    """A policy of ants neither acts in a cheetah nor starts one's training."""
-    cheetah = EnvRef("shapechanger/HalfCheetah-v1")
-    with pytest.raises(TransplantError, match=r"of another family than .*HalfCheetah-v1"):
-        _learner().evaluate(cheetah, policy, _NO_MAP)
-    with pytest.raises(TransplantError, match=r"of another family than .*HalfCheetah-v1"):
-        _learner().train(
-            cheetah, 32, 0, start=policy, body_map=_NO_MAP, on_evaluation=lambda _: None
-        )
 
 
 def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:

@@ -197,21 +197,6 @@ def test_intermediate_bodies_grow() -> None:
     np.testing.assert_allclose(lengths, [0.6, 0.9], rtol=1e-5)
 
 
-def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
-    """Evolution from Ant to ExtendedAnt, with a rule for the new motors."""
-    short = {"max_episode_steps": 20}
-    plan = tiny_plan(
-        TINY_NORMALISED,
-        task=TransferTask(ANT.having(short), EXTENDED.having(short)),
-        rules={"foot_*/motor": "copy ankle_*/motor"},
-        arms=("scratch", "evolution"),
-        steps=64,
-        source_steps=32,
-    )
-    study = run_study(plan, tmp_path / "study", executor=Serial())
-    assert [e.steps for e in study.of("evolution")[0].curve] == [0, 32, 64]
-
-
 def test_bodies_of_two_families_are_refused() -> None:
     with pytest.raises(StudyError, match="not of one family"):
         bodies_between(ANT, BIG, 1)

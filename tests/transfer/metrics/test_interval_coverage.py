@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy import stats
 
 from benchmarks.interval_coverage import CASES, METHODS, Case, Measured, measure
 from shapechanger.transfer.metrics.intervals import Estimate, estimate_difference
@@ -39,23 +38,6 @@ def test_welch_covers_95_percent_at_five_seeds(spread: float) -> None:
     arms = ARM[0] + (arms - ARM[0]) * spread / ARM[1]
     estimates = [estimate_difference(a, b) for a, b in zip(arms, scratches, strict=True)]
     assert coverage(estimates, ARM[0] - SCRATCH[0]) == pytest.approx(0.95, abs=0.02)
-
-
-@pytest.mark.slow
-def test_percentile_bootstrap_covers_87_percent_at_five_seeds() -> None:
-    arms, scratches = draw(n_seeds=5, seed=1)
-    interval = stats.bootstrap(
-        (arms, scratches),
-        lambda x, y, axis: x.mean(axis=axis) - y.mean(axis=axis),
-        n_resamples=1000,
-        batch=50,
-        axis=-1,
-        method="percentile",
-        rng=np.random.default_rng(2),
-    ).confidence_interval
-    truth = ARM[0] - SCRATCH[0]
-    held = (interval.low <= truth) & (truth <= interval.high)
-    assert held.mean() == pytest.approx(0.87, abs=0.02)
 
 
 def table() -> dict[Case, list[Measured]]:

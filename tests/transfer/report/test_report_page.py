@@ -186,6 +186,7 @@ def test_without_matplotlib_the_extra_is_named(
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     for name in ("reports.charts", "transfer.report.curves"):
         monkeypatch.delitem(sys.modules, f"shapechanger.{name}", raising=False)
+        monkeypatch.delattr(f"shapechanger.{name}", raising=False)
     assert measure_rows(study)
     assert verdict(study)
     with pytest.raises(MissingExtra, match=r"shapechanger\[report\]"):

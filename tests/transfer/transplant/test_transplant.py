@@ -52,7 +52,7 @@ class Box(gym.Env[np.ndarray, np.ndarray]):
         super().reset(seed=seed)
         return self.np_random.normal(size=self.observation_space.shape), {}
 
-    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> Any:
         """Return a random observation; some steps end the episode."""
         end = bool(self.np_random.uniform() < 0.1)
         observation = self.np_random.normal(size=self.observation_space.shape)
