@@ -20,13 +20,11 @@ SCALES = st.sampled_from([1.0, -1.0, 2.0, -0.5, 0.25, 8.0])
 
 
 def feature(name: str) -> Feature:
-    """Return a feature with the same meaning in every body; the eye is a block."""
     return Feature(name, "1", shape=(2, 2) if name == "eye" else (), gain_unit="N·m")
 
 
 @st.composite
 def layouts(draw: st.DrawFn) -> Layout:
-    """Draw some of the features in any order."""
     names = draw(st.lists(st.sampled_from(NAMES), unique=True, min_size=1))
     return Layout(tuple(feature(name) for name in names))
 
@@ -34,7 +32,6 @@ def layouts(draw: st.DrawFn) -> Layout:
 def rules(
     over: Layout, shape: tuple[int, ...], scales: st.SearchStrategy[float]
 ) -> st.SearchStrategy[Rule]:
-    """Return a strategy of rules for a feature of this shape."""
     constant = st.one_of(
         st.just(Zero()), st.just(Learn()), st.builds(Hold, st.sampled_from([-1.0, 0.1, 2.0]))
     )
@@ -52,7 +49,6 @@ def maps(
     source: tuple[Layout, Layout] | None = None,
     scales: st.SearchStrategy[float] = SCALES,
 ) -> BodyMap:
-    """Draw a map, from a given body or any body."""
     source_observation, source_action = source or (draw(layouts()), draw(layouts()))
     target_observation, target_action = draw(layouts()), draw(layouts())
 
@@ -71,7 +67,6 @@ def maps(
 
 @st.composite
 def chains(draw: st.DrawFn, length: int) -> list[BodyMap]:
-    """Draw maps whose layouts connect."""
     links = [draw(maps())]
     while len(links) < length:
         last = links[-1]
@@ -81,7 +76,6 @@ def chains(draw: st.DrawFn, length: int) -> list[BodyMap]:
 
 @st.composite
 def one_to_one(draw: st.DrawFn) -> BodyMap:
-    """Draw a map that copies no feature twice."""
     built = draw(maps())
 
     def thinned(entries: tuple[MapEntry, ...]) -> tuple[MapEntry, ...]:

@@ -44,7 +44,6 @@ source_steps = st.just(0) | st.integers(0, 2000)
 
 @st.composite
 def pairs(draw: st.DrawFn, low: float | None = None, high: float | None = None) -> Pair:
-    """Draw an arm and scratch on one grid of evaluations, with any number of seeds each."""
     gaps = draw(st.lists(st.integers(1, 300), min_size=1, max_size=5))
     steps = np.cumsum([0.0, *gaps])
     heights_here = heights if low is None else st.floats(low, high)
@@ -57,7 +56,6 @@ def pairs(draw: st.DrawFn, low: float | None = None, high: float | None = None) 
 
 
 def value(estimate: Estimate) -> float:
-    """Return the point estimate, which must exist."""
     assert estimate.value is not None
     return estimate.value
 

@@ -253,7 +253,6 @@ _SIMPLE: dict[Any, st.SearchStrategy[Any]] = {
 
 
 def _values_of(kind: Any) -> st.SearchStrategy[Any]:
-    """Return a strategy of the values of a field's type, within its bounds."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated and parts[0] is float:
         low, high = (
@@ -271,7 +270,6 @@ def _values_of(kind: Any) -> st.SearchStrategy[Any]:
 
 @st.composite
 def _edits(draw: st.DrawFn, kind: type[Edit]) -> Edit:
-    """Draw any edit of a kind; values that do not fit each other are drawn again."""
     fields = {field.name: _values_of(field.type) for field in msgspec.structs.fields(kind)}
     for _ in range(20):
         with contextlib.suppress(MorphologyError):

@@ -304,19 +304,16 @@ class _Check:
 
 
 def _names(model: mujoco.MjModel, kind: str) -> list[str]:
-    """Return the names of all elements of a kind."""
     count = {"body": "nbody", "joint": "njnt", "equality": "neq", "actuator": "nactuator"}
     number = getattr(model, count.get(kind, f"n{kind}"))
     return [getattr(model, kind)(i).name for i in range(number)]
 
 
 def _first(model: mujoco.MjModel, equality: str) -> str:
-    """Return the joint that a coupling moves."""
     return model.joint(int(model.equality(equality).obj1id[0])).name
 
 
 def _path(model: mujoco.MjModel, tendon: str) -> list[str]:
-    """Return what a spatial tendon passes, and its side sites."""
     found: list[str] = []
     of = model.tendon(tendon).id
     first = int(model.tendon_adr[of])
@@ -330,7 +327,6 @@ def _path(model: mujoco.MjModel, tendon: str) -> list[str]:
 
 
 def _target(model: mujoco.MjModel, actuator: str) -> list[str]:
-    """Return what an actuator drives, and relative to what."""
     of = model.actuator(actuator)
     kind = mujoco.mjtTrn(int(of.trntype[0]))
     words = {mujoco.mjtTrn.mjTRN_JOINT: "joint", mujoco.mjtTrn.mjTRN_TENDON: "tendon"}
@@ -339,13 +335,11 @@ def _target(model: mujoco.MjModel, actuator: str) -> list[str]:
 
 
 def _sensed(model: mujoco.MjModel, sensor: str) -> list[str]:
-    """Return the names that a sensor refers to."""
     of = model.sensor(sensor)
     ends = ((of.objtype[0], of.objid[0]), (of.reftype[0], of.refid[0]))
     return [mujoco.mj_id2name(model, int(kind), int(i)) for kind, i in ends if i >= 0]
 
 
 def _excluded(model: mujoco.MjModel) -> list[tuple[str, str]]:
-    """Return the pairs of bodies whose contacts are excluded."""
     pairs = [divmod(int(signature), 1 << 16) for signature in model.exclude_signature]
     return [(model.body(a).name, model.body(b).name) for a, b in pairs]

@@ -53,14 +53,12 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
         )
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
-        """Start at a random position near the middle."""
         super().reset(seed=seed)
         self.course = int(self.np_random.integers(HELD_OUT)) + HELD_OUT * self.held_out
         self.place = float(self.np_random.uniform(-0.8, 0.8))
         return self._picture(), {"course": self.course}
 
     def step(self, action: Any) -> Any:
-        """Move to the side."""
         wind = float(self.np_random.uniform(-0.05, 0.05))
         self.place += self.grip * float(action[0]) + wind
         terms = {
@@ -71,11 +69,9 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
         return self._picture(), sum(terms.values()), over, False, terms
 
     def hold_out(self) -> None:
-        """Draw courses from the held-out set."""
         self.held_out = True
 
     def demonstrator(self, seed: int) -> _Keeper:
-        """Return a demonstrator that steers to the middle."""
         return _Keeper(self, seed)
 
     def _picture(self) -> NDArray[np.uint8]:
@@ -94,7 +90,6 @@ class _Keeper:
         """Nothing to do at the start of an episode."""
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Steer straight to the middle, with a disturbance in three of ten steps."""
         meant = np.array([-self._lane.place, 0.5], np.float32)
         done = meant.copy()
         if self._rng.random() < 0.3:

@@ -69,7 +69,6 @@ def forget(name: str) -> None:
 
 
 def task_of(name: str) -> TransferTask:
-    """Return the task from the one robot to the other, with paths relative to the folder."""
     one, other = (
         EnvRef(OWN_ROBOT, {"path": path, "task": f"{name}_task:Hold", "max_episode_steps": 5})
         for path in ("a.xml", "b.xml")
@@ -78,7 +77,6 @@ def task_of(name: str) -> TransferTask:
 
 
 def plan_of(name: str, seeds: int = 2, **more: Any) -> Plan:
-    """Return the plan of a study of two arms, one of them of the user's own."""
     arms = ("scratch", f"{name}_method:{name}-warm")
     given = {"seeds": seeds, "steps": 8, "source_steps": 8, "arms": arms, **more}
     return make_plan(given.pop("task", task_of(name)), "tiny", TINY, **given)

@@ -31,20 +31,17 @@ TINY_NORMALISED = msgspec.structs.replace(TINY, normalise=True)
 
 
 def tiny_plan(settings: PpoSettings = TINY, **arguments: Any) -> Plan:
-    """Return the plan of a study that takes seconds."""
     task = arguments.pop("task", TransferTask(SMALL, BIG))
     return make_plan(task, "tiny", settings, **{"seeds": 2, **arguments})
 
 
 def curves(study: Study) -> dict[str, list[tuple[int, float]]]:
-    """Return every number that must be reproduced."""
     return {
         result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
     }
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
-    """Return the content of every file in a folder."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))

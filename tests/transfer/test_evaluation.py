@@ -1,4 +1,4 @@
-"""Evaluation of policies, in envs with known returns."""
+"""Evaluation of policies, in envs with known returns, and the shipped references."""
 
 from __future__ import annotations
 
@@ -14,15 +14,20 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import shapechanger  # noqa: F401  # Registers the ids.
-from shapechanger.contract.env_ref import EnvRef
+from shapechanger.contract.env_ref import EnvRef, measures_of
 from shapechanger.contract.measure import FORWARD_SPEED
+from shapechanger.envs.catalogue import CATALOGUE
+from shapechanger.envs.naming import default_learner
 from shapechanger.errors import UnknownName
+from shapechanger.policy import load_policy
+from shapechanger.transfer.identities import ENV, identify, known
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     evaluate,
     evaluation_seed,
     random_actions,
 )
+from shapechanger.transfer.references import FOLDER, load_references, reference_of, reference_policy
 
 
 @given(st.sets(st.integers(0, 99_999), min_size=2, max_size=2), st.integers(1, 10_000))
@@ -52,13 +57,11 @@ class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
-        """Start the episode."""
         assert seed is not None
         self.left = seed
         return np.array([float(self.left)]), {}
 
     def step(self, action: Any) -> Any:
-        """Count down by one."""
         self.left -= 1
         terms = {"reward_action": float(action[0]), "reward_alive": 1.0}
         return np.array([float(self.left)]), sum(terms.values()), self.left == 0, False, terms
@@ -99,7 +102,6 @@ class Succeeding(Countdown):
         self.successes = successes
 
     def step(self, action: Any) -> Any:
-        """Report the next value."""
         info = {"is_success": self.successes.pop(0)} if self.successes else {}
         return np.zeros(1), 0.0, not self.successes, False, info
 
@@ -145,3 +147,46 @@ def test_the_standing_share_of_a_vehicle_is_reported() -> None:
     assert 0.0 < fast.standing < 0.2
     countdown = evaluate(lambda seen: np.zeros((len(seen), 1)), [Countdown()], 5)
     assert countdown.standing is None
+
+
+REFERENCES = load_references()
+
+
+def test_every_env_of_the_catalogue_has_one() -> None:
+    assert set(REFERENCES) == set(CATALOGUE)
+    assert {path for path in FOLDER.glob("*.safetensors")} == {
+        reference_policy(env) for env in REFERENCES
+    }
+
+
+@pytest.mark.parametrize("env_id", REFERENCES)
+def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
+    """The card is the reference's, and an episode is far above the floor."""
+    env, reference = EnvRef(env_id), REFERENCES[env_id]
+    policy = load_policy(reference_policy(env_id))
+    assert policy.card.env == env
+    assert (policy.card.steps, policy.card.seed) == (reference.steps, reference.policy_seed)
+    assert policy.card.learner == reference.learner
+    assert policy.card.identity == known({ENV: identify(env)})
+    # The pendulums' were trained when learners acted in N.
+    in_newtons = "Pendulum" in env_id and "Double" not in env_id
+    assert default_learner(env) == ("ppo-pendulum" if in_newtons else reference.learner)
+    made = env.make()
+    try:
+        measures = [measure.name for measure in measures_of(made)]
+        found = evaluate(policy.act, [made], EVALUATION_SEED, episodes=1)
+    finally:
+        made.close()
+    assert list(reference.ends) == measures
+    measure = measures[0]
+    floor = max(values[measure] for values in reference.floor.values())
+    end = reference.ends[measure][reference.seeds.index(reference.policy_seed)]
+    assert found.value(measure) > floor + 0.25 * (end - floor)
+
+
+def test_other_bodies_have_none() -> None:
+    assert reference_of(EnvRef("shapechanger/Ant-v1")) is not None
+    assert reference_of(EnvRef("shapechanger/Ant-v1", {"body": "BigAnt"})) is None
+    assert reference_of(EnvRef("Ant-v5")) is None
+    with pytest.raises(UnknownName, match="reference policy"):
+        reference_policy("shapechanger/Car-v1")

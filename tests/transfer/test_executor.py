@@ -151,7 +151,6 @@ def test_processes_end_with_their_parent(tmp_path: Path) -> None:
 
 
 def _alive(pid: int) -> bool:
-    """Return whether a process runs; a zombie does not."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

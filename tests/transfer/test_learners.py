@@ -77,13 +77,11 @@ class Unstable(A2C):
     """A learner whose weights are NaN after its first update."""
 
     def train(self) -> None:
-        """Set the weights to NaN."""
         for weight in self.policy.parameters():
             weight.data.fill_(float("nan"))
 
 
 def settings_of(learner: str) -> Sb3Settings:
-    """Return small settings of each kind of learner."""
     if learner in ("sac", "tqc"):
         _, settings = resolve_learner(learner, SHORT)
     else:
@@ -101,7 +99,6 @@ EACH = ("sac", "tqc", "stable_baselines3:A2C", f"{HERE}:narrow_sac")
 
 
 def trained(learner: str, **options: Any) -> tuple[TrainedPolicy, list[Evaluation], Sb3Settings]:
-    """Return a policy trained for a second."""
     settings = settings_of(learner)
     curve: list[Evaluation] = []
     policy = Sb3Learner(learner, settings).train(

@@ -28,7 +28,6 @@ from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED
 
 
 def trained(settings: PpoSettings, seed: int = 0) -> tuple[TrainedPolicy, list[Evaluation]]:
-    """Return a policy trained for a second, and its curve."""
     curve: list[Evaluation] = []
     policy = Sb3Learner("tiny", settings).train(SMALL, 64, seed, on_evaluation=curve.append)
     return policy, curve

@@ -273,7 +273,6 @@ class Failing(Misnamed):
     """An env whose certificate fails in a rollout."""
 
     def certify_shift(self, source: Any, target: Any) -> str:
-        """Raise the TypeError of a wrong argument."""
         raise TypeError("can't multiply sequence by non-int")
 
 

@@ -43,7 +43,6 @@ class _Recording(Serial):
         self._refuses = refuses
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Record the jobs, and perform them unless `refuses`."""
         self.names += [job.name for job in jobs]
         if self._refuses:
             raise _Stopped
@@ -56,7 +55,6 @@ def _plan(source: EnvRef, target: EnvRef, **more: Any) -> Plan:
 
 
 def _study(plan: Plan) -> str:
-    """Return the name of a study of two lanes, such as Dry-to-Wet."""
     ends = (plan.task.source, plan.task.target)
     return "-to-".join(env.id.rpartition("/")[2].removesuffix("-v1") for env in ends)
 
@@ -67,7 +65,6 @@ def _run(plan: Plan, out: Path, executor: Executor) -> Study:
 
 
 def _names(*kinds: str) -> set[str]:
-    """Return the names of the runs of two seeds; zero-action has one run."""
     return {
         f"{kind}-{index}" for kind in kinds for index in range(1 if kind == "zero-action" else 2)
     }
@@ -90,7 +87,6 @@ def out(first: Path, tmp_path: Path) -> Path:
 
 
 def _requested(plan: Plan, out: Path) -> set[str]:
-    """Return the runs that a study would perform, without performing them."""
     executor = _Recording(refuses=True)
     with pytest.raises(_Stopped):
         _run(plan, out, executor=executor)
@@ -176,7 +172,6 @@ _STEADY = np.linspace(0.0, 1000.0, 11)  # To 1,000 in 10,240 steps, an evaluatio
 
 
 def _twice(means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return curves of two seeds around these means, shape (2, 11)."""
     return means + np.array([[-30.0], [30.0]])
 
 

@@ -17,12 +17,10 @@ ANT_FLIP = ["hip_*"]
 
 
 def motor(name: str, gain: float = 150.0, unit: str = "N·m") -> Feature:
-    """Return an action feature with the range -1 to 1."""
     return Feature(f"{name}/motor", "1", -1.0, 1.0, gain=gain, gain_unit=unit)
 
 
 def ant_observation(*, feet: bool = False) -> Layout:
-    """Return an ant's observation: torso, joints, velocities and forces on the shanks."""
     ankle = {1: (30, 100), 2: (-100, -30), 3: (-100, -30), 4: (30, 100)}
     torso = [Feature("torso/z", "m")]
     torso += [Feature(f"torso/{axis}", "1") for axis in ("qw", "qx", "qy", "qz")]
@@ -47,7 +45,6 @@ def ant_observation(*, feet: bool = False) -> Layout:
 
 
 def ant_action(*, feet: bool = False) -> Layout:
-    """Return an ant's action, in MuJoCo's order of the motors."""
     motors = [motor(f"{joint}_{leg}") for leg in (4, 1, 2, 3) for joint in ("hip", "ankle")]
     if feet:
         motors += [motor(f"foot_{leg}") for leg in (4, 1, 2, 3)]
@@ -55,7 +52,6 @@ def ant_action(*, feet: bool = False) -> Layout:
 
 
 def pendulum_observation(hinge: str = "hinge", unit: str = "rad") -> Layout:
-    """Return the observation of a cart with a pole."""
     return Layout(
         (
             Feature("slider/position", "m", -1.0, 1.0),
@@ -67,19 +63,16 @@ def pendulum_observation(hinge: str = "hinge", unit: str = "rad") -> Layout:
 
 
 def pendulum_action(gain: float = 100.0, unit: str = "N", name: str = "slide") -> Layout:
-    """Return the action of a cart with a pole."""
     return Layout((motor(name, gain, unit),))
 
 
 def carts(source: Layout, target: Layout, **options: Any) -> BodyMap:
-    """Return the map between two carts with a pole that differ in their actions."""
     return BodyMap.between(
         pendulum_observation(), pendulum_observation(), source, target, **options
     )
 
 
 def grown(**options: Any) -> BodyMap:
-    """Return the map from the ant to the ant with feet."""
     return BodyMap.between(*GROWN, **options)
 
 

@@ -26,7 +26,6 @@ class Recorder(gym.Env[np.ndarray, np.ndarray]):
         self.moved: list[np.ndarray] = []
 
     def sensed(self) -> np.ndarray:
-        """Return a different number for each entry and step."""
         return np.linspace(-0.3, 0.3, self.observation_layout.size) + len(self.moved)
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, Any]:
@@ -34,7 +33,6 @@ class Recorder(gym.Env[np.ndarray, np.ndarray]):
         return self.sensed(), {"options": options}
 
     def step(self, action: Any) -> Any:
-        """Record the action."""
         self.moved.append(action)
         return self.sensed(), 2.5, True, False, {"moved": action}
 

@@ -23,7 +23,6 @@ from tests.transfer.body_map.bodies import (
 
 
 def small() -> BodyMap:
-    """Return a map with each kind of rule."""
     return BodyMap.between(
         Layout((Feature("z", "m"), Feature("lost", "m"), Feature("rest", "rad"))),
         Layout((Feature("new", "m"), Feature("z", "m"))),
@@ -163,7 +162,6 @@ def test_an_inverse_keeps_the_origin_of_its_rules() -> None:
 
 
 def copied() -> BodyMap:
-    """Return a map in which two target motors copy one source motor."""
     return BodyMap.between(
         Layout((Feature("z", "m"), Feature("height", "m"))),
         Layout((Feature("z", "m"),)),

@@ -1,7 +1,8 @@
-"""Matching of features to rules."""
+"""Rules of a body map: their arithmetic, matching of features, globs and TOML."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -9,8 +10,10 @@ import pytest
 from shapechanger.errors import MapError, UnknownName
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, Zero
-from shapechanger.transfer.body_map.rules import Rule, RuleLike
+from shapechanger.transfer.body_map.rules import Rule, RuleLike, expand_template
 from tests.transfer.body_map.bodies import (
+    ANT_FLIP,
+    ANT_SWAP,
     DEGREE,
     GROWN,
     ant_action,
@@ -23,8 +26,89 @@ from tests.transfer.body_map.bodies import (
 )
 
 
+@pytest.mark.parametrize("scale", [0.0, math.nan, math.inf])
+def test_an_invalid_scale_is_refused(scale: float) -> None:
+    with pytest.raises(MapError, match="'hip/angle' must be finite and not zero"):
+        Copy("hip/angle", scale)
+    with pytest.raises(MapError, match="must be finite, got nan"):
+        Hold(math.nan)
+
+
+@pytest.mark.parametrize(
+    ("template", "pattern", "name", "result"),
+    [
+        ("ankle_1/motor", "foot_*/motor", "foot_2/motor", "ankle_1/motor"),
+        ("ankle_*/motor", "foot_*/motor", "foot_2/motor", "ankle_2/motor"),
+        ("ankle_*/motor", "foot_?/motor", "foot_2/motor", "ankle_2/motor"),
+        ("ankle_*/motor", "foot_[12]/motor", "foot_2/motor", "ankle_2/motor"),
+        ("ankle_*/motor", "foot_[!34]/motor", "foot_2/motor", "ankle_2/motor"),
+        ("*/a_*", "*_*", "b.c_d", "b.c/a_d"),
+    ],
+)
+def test_stars_take_the_matched_text(template: str, pattern: str, name: str, result: str) -> None:
+    assert expand_template(template, pattern, name) == result
+
+
+@pytest.mark.parametrize("pattern", ["foot_2/motor", "*_*/motor"])
+def test_the_number_of_stars_must_match(pattern: str) -> None:
+    """A template with more or fewer stars than wildcards is refused."""
+    with pytest.raises(MapError, match="must have a star for each wildcard"):
+        expand_template("ankle_*/motor", pattern, "foot_2/motor")
+
+
+def _layout(*names: str) -> Layout:
+    return Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in names))
+
+
+MOTOR = _layout("motor")
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "rules", "expected"),
+    [
+        # `leg[12]` names one feature; `leg1` and `leg2` get the default rule.
+        (
+            ("leg[12]", "leg1", "leg2", "tail*", "tail_2", "same"),
+            ("same",),
+            {"leg[12]": Hold(0.5), "tail*": Hold(0.25)},
+            (Hold(0.5), Zero(), Zero(), Hold(0.25), Zero(), Copy("same")),
+        ),
+        # A target feature named `eye*` is copied literally.
+        (
+            ("left/eye", "same"),
+            ("eye*", "same"),
+            {"left/*": "copy eye*"},
+            (Copy("eye*"), Copy("same")),
+        ),
+        # As in `fnmatch`: `[]` and `[!]` stand for themselves, `[]]` and `[!a]` for a character.
+        (
+            ("a[]_1", "b[!]_2", "c]_3", "d]_4", "same"),
+            ("x1", "x2", "y]3", "y]4", "same"),
+            {"a[]_*": "copy x*", "b[!]_*": "copy x*", "c[]]_*": "copy y**", "d[!a]_*": "copy y**"},
+            (Copy("x1"), Copy("x2"), Copy("y]3"), Copy("y]4"), Copy("same")),
+        ),
+    ],
+)
+def test_an_exact_name_is_not_a_glob(
+    source: tuple[str, ...], target: tuple[str, ...], rules: dict[str, object], expected: object
+) -> None:
+    built = BodyMap.between(_layout(*source), _layout(*target), MOTOR, MOTOR, rules=rules)
+    assert tuple(entry.rule for entry in built.observation) == expected
+
+
+def test_a_mirror_prefers_exact_names_to_globs() -> None:
+    """`leg?` and `arm*` are elements; `legs` and `arms` stay in place."""
+    layout = _layout("leg?/angle", "legs/angle", "arm*/angle", "arms/angle")
+    found = BodyMap.mirror(layout, MOTOR, swap={"leg?": "arm*"}, flip=["leg?", "arm*"])
+    assert [entry.rule for entry in found.observation] == [
+        Copy("arm*/angle", -1.0),
+        Copy("legs/angle"),
+        Copy("leg?/angle", -1.0),
+        Copy("arms/angle"),
+    ]
+
+
 def rules_of(built: BodyMap) -> dict[str, object]:
-    """Return the rule of each feature that is filled."""
     return {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
 
 
@@ -199,3 +283,100 @@ def test_equal_torque_is_a_scale() -> None:
     assert carts(silent, silent, units="torque").action[0].rule == Copy("slide/motor")
     with pytest.raises(MapError, match="gives 100 N and one of 'slide/motor' 100 N·m"):
         carts(pendulum_action(), pendulum_action(unit="N·m"), units="torque")
+
+
+EXAMPLE = """
+units = "same"
+otherwise = { hold = 0.1 }
+
+[observation]
+"torso/vx" = { take = "torso/vx", scale = 0.5 }
+
+[action]
+"foot_1/motor" = { take = "ankle_1/motor", scale = -0.5 }
+"foot_2/motor" = "learn"
+"foot_[3]/motor" = "copy ankle_*/motor"
+"""
+
+
+def test_a_person_can_write_a_map() -> None:
+    built = BodyMap.from_toml(EXAMPLE, *GROWN)
+    rules = {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
+    assert rules["torso/vx"] == Copy("torso/vx", 0.5)
+    assert rules["foot_1/motor"] == Copy("ankle_1/motor", -0.5)
+    assert rules["foot_2/motor"] == Learn()
+    assert rules["foot_3/motor"] == Copy("ankle_3/motor")
+    assert rules["foot_4/motor"] == Hold(0.1)
+
+
+def test_an_empty_text_matches_by_name() -> None:
+    assert BodyMap.from_toml("", *GROWN) == BodyMap.between(*GROWN)
+
+
+def test_units_come_from_the_text() -> None:
+    sides = pendulum_observation(), pendulum_observation()
+    built = BodyMap.from_toml(
+        'units = "torque"', *sides, pendulum_action(100.0), pendulum_action(200.0)
+    )
+    assert built.action[0].rule == Copy("slide/motor", 0.5)
+
+
+def test_exact_rules_are_not_checked() -> None:
+    """`units = "exact"` accepts scales of 1 between units and constants beyond the range."""
+    text = 'units = "exact"\n[action]\n"foot_*/motor" = { hold = 3.0 }'
+    built = BodyMap.from_toml(text, *GROWN)
+    assert {e.rule for e in built.action if e.feature.startswith("foot")} == {Hold(3.0)}
+
+
+@pytest.mark.parametrize(("of", "feet"), [("", (False, True)), ('of = "target"', (True, False))])
+def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -> None:
+    layouts = (*(ant_observation(feet=f) for f in feet), *(ant_action(feet=f) for f in feet))
+    text = f'[symmetry]\n{of}\nswap = {{ "*_1" = "*_4", "*_2" = "*_3" }}\nflip = ["hip_*"]\n'
+    image = BodyMap.mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
+    there, built = BodyMap.between(*layouts), BodyMap.from_toml(text, *layouts)
+    assert built == (there.then(image) if of else image.then(there))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("units = ", "This is not TOML"),
+        ("unit = 'same'", "No key matches 'unit'. Did you mean 'units'?"),
+        ("\ufeffunits = 'torq'", "units: No word matches 'torq'. Did you mean 'torque'?"),
+        ("units = 3", "'map' is wrong: Expected `str`, got `int` - at `$.units`"),
+        ("otherwise = 'copy hip_1/motor'", "'zero', 'hold' or 'learn', not 'copy"),
+        ("otherwise = 'lern'", "otherwise: No word matches 'lern'. Did you mean 'learn'?"),
+        ("action = 3", "at `$.action`"),
+        ("[action]\n'foot_1/motor' = 3", "'foot_1/motor' is wrong: Expected `object`"),
+        ("[action]\n'foot_1/motor' = { tak = 'x' }", "No key of 'foot_1/motor' matches 'tak'"),
+        ("[action]\n'foot_1/motor' = { scale = 2 }", "not a table of scale"),
+        ("[action]\n'foot_1/motor' = {}", "not a table of nothing"),
+        ("[action]\n'foot_1/motor' = { hold = true }", "'foot_1/motor' is wrong: Expected `float`"),
+        ("[action]\n'foot_1/motor' = { take = 1 }", "'foot_1/motor' is wrong: Expected `str`"),
+        (
+            "[action]\n'foot_1/motor' = { take = 'x', scale = 'y' }",
+            "'foot_1/motor' is wrong: Expected `float`",
+        ),
+        ("[action]\n'foot_1/motor' = { take = 'ankle_1/motor', scale = 0 }", "not zero"),
+        ("[symmetry]\nof = 'both'", "of: No word matches 'both'"),
+        ("[symmetry]\nflop = []", "No key of 'symmetry' matches 'flop'. Did you mean 'flip'?"),
+        ("[symmetry]\nswap = ['hip_1']", "at `$.symmetry.swap`"),
+    ],
+)
+def test_wrong_text_is_explained(text: str, message: str) -> None:
+    """Errors name the key, and suggest the nearest spelling."""
+    with pytest.raises(MapError) as caught:
+        BodyMap.from_toml(text, *GROWN)
+    assert message in str(caught.value)
+
+
+def test_a_copy_needs_no_scale() -> None:
+    built = BodyMap.from_toml('[action]\n"foot_1/motor" = { take = "ankle_1/motor" }', *GROWN)
+    assert Copy("ankle_1/motor") in [entry.rule for entry in built.action]
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'foot_1/motor'"):
+        BodyMap.from_toml('[action]\n"fot_1/motor" = "zero"', *GROWN)
+    with pytest.raises(UnknownName, match="No target action feature"):
+        BodyMap.from_toml('[action]\n"hip_1/angle" = "zero"', *GROWN)

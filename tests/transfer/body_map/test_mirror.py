@@ -22,7 +22,6 @@ from tests.transfer.body_map.bodies import (
 
 
 def ant_mirror() -> BodyMap:
-    """Return the left-right mirror of the ant."""
     return BodyMap.mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
 
 

@@ -19,13 +19,11 @@ ARM, SCRATCH = (0.8, 0.1), (0.5, 0.1)
 
 
 def draw(n_seeds: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return scores of both arms in many studies, each of shape (TRIALS, n_seeds)."""
     rng = np.random.default_rng(seed)
     return rng.normal(*ARM, (TRIALS, n_seeds)), rng.normal(*SCRATCH, (TRIALS, n_seeds))
 
 
 def coverage(estimates: list[Estimate], truth: float) -> float:
-    """Return the share of the intervals that contain the true value; all must exist."""
     held = [e.low <= truth <= e.high for e in estimates if e.low is not None and e.high is not None]
     assert len(held) == TRIALS
     return sum(held) / TRIALS
@@ -41,7 +39,6 @@ def test_welch_covers_95_percent_at_five_seeds(spread: float) -> None:
 
 
 def table() -> dict[Case, list[Measured]]:
-    """Return the rows of the table in docs/statistics.md."""
     rows: dict[Case, list[Measured]] = {}
     for line in PAGE.read_text(encoding="utf-8").splitlines():
         data, *cells = (cell.strip() for cell in line.strip("|").split("|"))

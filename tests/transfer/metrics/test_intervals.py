@@ -24,7 +24,6 @@ SCRATCH = np.array([0.5, 0.4, 0.7, 0.6])
 def ratio(
     arm: NDArray[np.float64], scratch: NDArray[np.float64], *, n_resamples: int = 2000
 ) -> Estimate:
-    """Return `estimate_ratio` with few resamples and a least mean of 0.01."""
     return estimate_ratio(
         arm,
         scratch,

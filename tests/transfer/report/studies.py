@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,14 +35,12 @@ SETTINGS = PpoSettings(
 def rising(
     start: float, end: float, half: float, seeds: int = 5, noise: float = 20.0, seed: int = 0
 ) -> NDArray[np.float64]:
-    """Return curves from `start` to `end` with half-life `half`, shape (seeds, 11)."""
     rng = np.random.default_rng(seed)
     way = 1.0 - 0.5 ** (STEPS / half)
     return start + (end - start) * way + rng.normal(0.0, noise, (seeds, STEPS.size))
 
 
 def body_map() -> BodyMap:
-    """Return a map from one leg to two; the tail is lost."""
     source = ("torso/z", "leg_1/angle", "tail/angle")
     target = ("torso/z", "leg_1/angle", "leg_2/angle")
     return BodyMap.between(
@@ -55,14 +52,7 @@ def body_map() -> BodyMap:
     )
 
 
-def same_body() -> BodyMap:
-    """Return a map for a change of masses only."""
-    layout = Layout((Feature("hinge/angle", "rad"),))
-    return BodyMap.identity(layout, Layout((Feature("slide/motor", "1", -1.0, 1.0),)))
-
-
 def results(kind: str, returns: NDArray[np.float64], terms: Sequence[str] = ()) -> list[RunResult]:
-    """Return the runs of one kind, from returns of shape (seeds, evaluations)."""
     return [
         RunResult(
             Run(kind, index),
@@ -84,45 +74,34 @@ def results(kind: str, returns: NDArray[np.float64], terms: Sequence[str] = ()) 
 
 def make_study(
     *,
-    scratch: NDArray[np.float64] | None = None,
-    fine_tune: NDArray[np.float64] | None = None,
-    zero_shot: NDArray[np.float64] | None = None,
-    random: NDArray[np.float64] | None = None,
     arms: tuple[str, ...] = ARMS,
     source_steps: int = 2048,
     given: bool = False,
     terms: Sequence[str] = (),
-    source: EnvRef | None = None,
-    target: EnvRef | None = None,
-    the_map: BodyMap | None = None,
-    normalise: bool = False,
+    source: EnvRef = EnvRef("shapechanger/Ant-v1"),  # noqa: B008 - frozen.
+    target: EnvRef = EnvRef("shapechanger/BigAnt-v1"),  # noqa: B008 - frozen.
     command: str = "shapechanger transfer Ant BigAnt --seeds 5",
     shift: str = "pole: length 0.6 m -> 1.2 m (x2)",
+    **curves: NDArray[np.float64],
 ) -> Study:
-    """Return a study in which transfer helps, unless other curves are given."""
-    scratch = rising(0.0, 1000.0, 3000.0) if scratch is None else scratch
-    seeds = scratch.shape[0]
+    """Return a study in which transfer helps, unless other curves are given by kind."""
+    own = {kind.replace("_", "-"): rows for kind, rows in curves.items()}
+    seeds = len(own.setdefault("scratch", rising(0.0, 1000.0, 3000.0)))
     drawn: dict[str, NDArray[np.float64]] = {
         "source": rising(0.0, 1000.0, 2500.0, seeds, seed=1),
-        "random": np.linspace(5.0, 15.0, seeds)[:, np.newaxis] if random is None else random,
-        "scratch": scratch,
-        "zero-shot": (
-            np.linspace(350.0, 450.0, seeds)[:, np.newaxis] if zero_shot is None else zero_shot
-        ),
-        "fine-tune": (
-            rising(400.0, 1000.0, 1000.0, seeds, seed=2) if fine_tune is None else fine_tune
-        ),
+        "random": np.linspace(5.0, 15.0, seeds)[:, np.newaxis],
+        "zero-shot": np.linspace(350.0, 450.0, seeds)[:, np.newaxis],
+        "fine-tune": rising(400.0, 1000.0, 1000.0, seeds, seed=2),
+        **own,
     }
     drawn["zero-action"] = drawn["random"][:1]
     drawn["frozen-trunk"] = drawn["fine-tune"]
     wanted: list[str] = [*([] if given else ["source"]), "random", "zero-action", *arms]
     plan = Plan(
-        task=TransferTask(
-            source or EnvRef("shapechanger/Ant-v1"), target or EnvRef("shapechanger/BigAnt-v1")
-        ),
-        body_map=the_map or body_map(),
+        task=TransferTask(source, target),
+        body_map=body_map(),
         learner="ppo-balance",
-        settings=msgspec.structs.replace(SETTINGS, normalise=normalise),
+        settings=SETTINGS,
         steps=10_240,
         source_steps=source_steps,
         seeds=seeds,
@@ -144,7 +123,6 @@ def make_study(
 
 
 def _summaries(plan: Plan, drawn: dict[str, NDArray[np.float64]]) -> dict[str, Summary]:
-    """Return the measures, with few resamples."""
     scratch = LearningCurves(STEPS, drawn["scratch"])
     ends = {arm: float(drawn[arm][:, -plan.last_k :].mean()) for arm in plan.arms}
     floors = {"random actions": float(drawn["random"].mean())}

@@ -31,15 +31,7 @@ VOID = {"meta", "img"}
 
 
 class Reader(HTMLParser):
-    """Parser of a page that asserts that every tag is closed.
-
-    Attributes:
-        words: The text of the page, with single spaces.
-        attributes: Every attribute with its value.
-        headings: The text of the headings h1 and h2.
-        ids: All ids.
-        tags: All tags, in order.
-    """
+    """Words, attributes, headings and tags of a page, of which every tag must be closed."""
 
     def __init__(self, page: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -52,10 +44,8 @@ class Reader(HTMLParser):
         self.close()
         assert self._open == []
         self.words = " ".join(" ".join(self._pieces).split())
-        self.ids = [value for name, value in self.attributes if name == "id"]
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Record an element."""
         self.tags.append(tag)
         self.attributes += [(name, value or "") for name, value in attrs]
         if tag not in VOID:
@@ -64,11 +54,9 @@ class Reader(HTMLParser):
             self.headings.append("")
 
     def handle_endtag(self, tag: str) -> None:
-        """Check that tags are nested."""
         assert self._open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        """Record text."""
         if self._open and self._open[-1] != "style":
             self._pieces.append(data)
         if self._open and self._open[-1] in {"h1", "h2"}:
@@ -328,7 +316,6 @@ def test_without_learning_there_are_no_scores() -> None:
 
 
 def same(level: float, seeds: int = 5) -> np.ndarray:
-    """Return curves without spread."""
     return np.full((seeds, 11), level)
 
 

@@ -160,7 +160,6 @@ SLOPE = STEPS / STEPS[-1]
 
 
 def by_name(study: Study, arm: str) -> dict[str, MeasureRow]:
-    """Return the rows of one arm."""
     return {row.measure: row for row in measure_rows(study) if row.arm == arm}
 
 

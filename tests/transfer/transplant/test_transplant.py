@@ -48,30 +48,25 @@ class Box(gym.Env[np.ndarray, np.ndarray]):
         self.action_space = gym.spaces.Box(low, high, dtype=np.float32)
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, Any]:
-        """Start an episode."""
         super().reset(seed=seed)
         return self.np_random.normal(size=self.observation_space.shape), {}
 
     def step(self, action: Any) -> Any:
-        """Return a random observation; some steps end the episode."""
         end = bool(self.np_random.uniform() < 0.1)
         observation = self.np_random.normal(size=self.observation_space.shape)
         return observation, float(action.sum()), end, False, {}
 
 
 def envs(observation: Layout, action: Layout, *, normalised: bool = False) -> Any:
-    """Return a vectorised env, with new statistics if normalised."""
     one = DummyVecEnv([lambda: Box(observation, action)])
     return VecNormalize(one) if normalised else one
 
 
 def targets(body_map: BodyMap, *, normalised: bool = False) -> Any:
-    """Return a vectorised env of the target of a map."""
     return envs(body_map.target_observation, body_map.target_action, normalised=normalised)
 
 
 def ant_map(source_feet: bool, target_feet: bool, **options: Any) -> BodyMap:
-    """Return the map between two ants."""
     return BodyMap.between(
         ant_observation(feet=source_feet),
         ant_observation(feet=target_feet),
@@ -115,7 +110,6 @@ def trained(
     policy: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> Model:
-    """Return a model of the source with random weights and statistics."""
     env = env or envs(body_map.source_observation, body_map.source_action, normalised=normalised)
     kwargs = {"net_arch": net_arch[kind is SAC], **(policy or {})}
     quick = {"n_steps": 32, "batch_size": 16} if kind is PPO else {"buffer_size": 64}
@@ -134,7 +128,6 @@ def trained(
 
 
 def sensed(model: Model, observation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the network's inputs for an observation, in double precision."""
     normalize = model.get_vec_normalize_env()
     if normalize is None or not normalize.norm_obs:
         return observation
@@ -145,7 +138,6 @@ def sensed(model: Model, observation: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def computed(model: Model, z: NDArray[np.float64], u: NDArray[np.float64] | None = None) -> Numbers:
-    """Return all outputs of the networks, in the precision of their weights."""
     dtype = next(model.policy.parameters()).dtype
     inputs = torch.as_tensor(z, dtype=dtype)
     with torch.no_grad():
@@ -188,7 +180,6 @@ def expected(
 
 
 def back_to_source(body_map: BodyMap, u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return source actions for target actions, by copies of the same name if any."""
     column = {name: place.start for name, place in body_map.target_action.slices.items()}
     signed: dict[str, NDArray[np.float64]] = {}
     for entry in body_map.action:
