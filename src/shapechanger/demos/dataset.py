@@ -21,7 +21,6 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.demos.episodes.records import is_episode
 from shapechanger.demos.exchange import import_episodes
-from shapechanger.demos.exchange.format import kept_steps
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.demos.statistics import is_same_rate, rate_jitter
 from shapechanger.errors import DemosError, UnknownName
@@ -188,8 +187,8 @@ def _episodes(data: Path) -> Iterator[tuple[str, EpisodeHeader, Iterator[_StepAn
             yield str(path), episode.header, steps
         return
     for number, found in enumerate(import_episodes(data)):
-        kept = enumerate(kept_steps(found.rows))
-        steps = ((structs.replace(step, index=n), jpeg) for n, (step, jpeg) in kept)
+        kept = enumerate(record for record in found.records if record.dropped is None)
+        steps = ((structs.replace(one.step, index=n), one.jpeg) for n, one in kept)
         yield f"{data}, episode {number}", found.header, steps
 
 

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from shapechanger.demos.exchange import ImportContext
 from shapechanger.demos.exchange.lerobot import FORMAT
 from shapechanger.demos.jpeg import decode_picture
+from tests.demos.exchange.small import read_whole
 
 SIZE = 32
 CAMERA = "observation.images.front"
@@ -140,15 +141,7 @@ def pairs_of(folder: Path, camera: str = "") -> tuple[list[list[tuple[int, int]]
 
     One list for each episode; -1 for no image.
     """
-    context = ImportContext(camera=camera)
-    found: list[list[tuple[int, int]]] = []
-    assert FORMAT.read is not None
-    for episode in FORMAT.read(folder, context):
-        picture = -1
-        steps: list[tuple[int, int]] = []
-        for row in episode.rows:
-            picture = picture if row.jpeg is None else shown_in(row.jpeg)
-            steps.append((int(row.step.action[0]), picture))
-        if steps:
-            found.append(steps)
-    return found, context
+    read, context = read_whole(folder, FORMAT, camera)
+    shown = {one.jpeg: shown_in(one.jpeg) for part in read for one in part if one.jpeg}
+    pairs = [[(int(o.step.action[0]), shown.get(o.jpeg or b"", -1)) for o in p] for p in read]
+    return list(filter(None, pairs)), context

@@ -20,6 +20,9 @@ from shapechanger.demos.episodes import (
     episodes_of,
     read_episode,
 )
+from shapechanger.demos.exchange import Converted, Format, ImportContext, Record
+from shapechanger.demos.exchange.format import whole_records
+from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 
 ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
@@ -129,6 +132,26 @@ def tub_folder(
     manifest = [list(kinds), list(kinds.values()), {}, {}, ending | {"deleted_indexes": [*deleted]}]
     (folder / "manifest.json").write_text("".join(json.dumps(line) + "\r\n" for line in manifest))
     return folder
+
+
+def read_whole(
+    folder: Path, form: Format, camera: str = ""
+) -> tuple[list[list[Record]], ImportContext]:
+    """Read a folder as an import does: the whole records of each episode, and the findings."""
+    context = ImportContext(camera=camera)
+    found: list[list[Record]] = []
+    assert form.read is not None
+    for episode in form.read(folder, context):
+        try:
+            found.append(list(whole_records(episode, context)))
+        except DemosError as error:
+            context.report("left out", str(error), episode.name)
+    return found, context
+
+
+def findings_of(found: ImportContext | Converted) -> str:
+    """Return all findings as text, a line each."""
+    return "\n".join(f"{kind}: {text}" for kind, text in found.findings)
 
 
 def all_of(data: Path) -> list[Episode]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 import re
 from collections.abc import Callable
@@ -24,6 +23,7 @@ from tests.demos.exchange.small import (
     all_of,
     content_of,
     drive,
+    findings_of,
     header,
     huge,
     keys_folder,
@@ -86,12 +86,16 @@ FALSE = b"false,false"
         (
             False,
             lambda f: (f / "2.jpg").unlink(),
-            "1 line with an image that cannot be read (No such file or directory): line 3",
+            "line 3 of keys: an image that cannot be read (No such file or directory)",
         ),
-        (False, _edit("2.jpg", lambda jpeg: huge()), "with a damaged image: line 3"),
+        (False, _edit("2.jpg", lambda jpeg: huge()), "line 3 of keys: a damaged image"),
         (False, _edit("2.jpg", lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
-        (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"), "line 3: it is not a valid step"),
-        (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,nan,0.0,1.0"), "line 3: its action is"),
+        (
+            False,
+            _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"),
+            "line 3 of keys: it is not a valid step",
+        ),
+        (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,nan,0.0,1.0"), "line 3 of keys: its action is"),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,,1.0"), "its action has 3 values"),
         (False, _table(b"0.0,0.0,0.0,1.0", b",,,"), "missing required field `action`"),
         (False, _table(b"\n2.jpg", b"\n../2.jpg"), "leaves the folder"),
@@ -101,7 +105,7 @@ FALSE = b"false,false"
         (False, _link_away, "leaves the folder"),
         (True, _table(b"000001.jpg", b"../1.jpg"), "leaves the folder"),
         (True, _table(FALSE + b",,,\n4", b"maybe,false,,,\n4"), "`bool`, got `str`"),
-        (True, _table(FALSE + b",,,\n4", b",false,,,\n4"), "line 5: terminated is empty"),
+        (True, _table(FALSE + b",,,\n4", b",false,,,\n4"), "line 5 of out-v0: terminated is empty"),
         (True, _table(b"\n3,", b"\n2,"), "step 2 is not after the step before"),
         (True, _table(b"\n3,", b"\n3,x\n3.5,"), "2 cells instead of"),
         (
@@ -119,18 +123,8 @@ def test_damaged_lines_of_csv(
     spoil(folder)
     assert expected in refused(folder, tmp_path / "data", strict=True)
     done = import_recording(folder, tmp_path / "data")
-    assert expected in "; ".join(done.left_out)
+    assert expected in findings_of(done)
     assert done.steps == (4 if own else 2)
-
-
-def _spreadsheet(text: bytes, separator: str, *, comma: bool = False) -> bytes:
-    """Return CSV as a spreadsheet writes it back."""
-    out = io.StringIO()
-    writer = csv.writer(out, delimiter=separator, quoting=csv.QUOTE_MINIMAL)
-    for row in csv.reader(io.StringIO(text.decode())):
-        decimal = [re.sub(r"^(-?\d+)\.(\d+)$", r"\1,\2", cell) for cell in row]
-        writer.writerow(decimal if comma else row)
-    return out.getvalue().encode()
 
 
 @pytest.mark.parametrize(
@@ -138,20 +132,15 @@ def _spreadsheet(text: bytes, separator: str, *, comma: bool = False) -> bytes:
     [
         lambda t: b"\xef\xbb\xbf" + t,
         lambda t: t.replace(b"\n", b"\r\n"),
-        lambda t: t.replace(b"\n", b"\n\n"),
-        lambda t: t + b",,,,,,\r\n  \n",
-        lambda t: _spreadsheet(t, "\t"),
-        lambda t: _spreadsheet(t, ";"),
-        lambda t: _spreadsheet(t, ";", comma=True),
-        lambda t: b"\xef\xbb\xbfsep=;\r\n" + _spreadsheet(t, ";", comma=True),
+        lambda t: t.replace(b"\n", b"\n\n") + b",,,,,,\r\n  \n",
+        lambda t: t.replace(b",", b";"),
     ],
 )
 def test_csv_of_spreadsheets(tmp_path: Path, change: Callable[[bytes], bytes]) -> None:
-    """Separators, decimal commas, blank lines and marks of spreadsheets change no number."""
+    """Semicolons, blank lines and marks of spreadsheets change no number."""
     folder = _exported(tmp_path, "csv")
     _edit("steps.csv", change)(folder)
-    done = import_recording(folder, tmp_path / "back", strict=True)
-    assert done.steps == 5
+    assert import_recording(folder, tmp_path / "back", strict=True).steps == 5
     (before,), (after,) = all_of(tmp_path / "recorded"), all_of(tmp_path / "back")
     assert content_of(after)["steps"] == content_of(before)["steps"]
 
@@ -219,7 +208,7 @@ def _with_rest(text: str) -> Callable[[Path], None]:
         ("minari", _in_file(_leads_away), "has no 'actions' that is an array in this file"),
         ("minari", _swap("data/main_data.hdf5", b"SNOD", b"XXXX"), "not an intact"),
         ("minari", _in_file(_short), "has 2 entries for 5 steps"),
-        ("minari", _in_file(_spoilt), "with a damaged image"),
+        ("minari", _in_file(_spoilt), "a damaged image"),
     ],
 )
 def test_a_dataset_that_cannot_be_read(
@@ -279,8 +268,8 @@ def test_invalid_outputs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"control_hz": 10.0}, "other steps a second than .* a Minari dataset has one kind"),
-        ({"image_size": (80, 60)}, "other images than"),
+        ({"control_hz": 10.0}, "in its control_hz, but a Minari dataset has one kind"),
+        ({"image_size": (80, 60)}, "in its image_size"),
     ],
 )
 def test_episodes_of_two_kinds(tmp_path: Path, changes: dict[str, object], expected: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from shapechanger.layout import Layout
 from tests.demos.exchange.small import (
     all_of,
     drive,
+    findings_of,
     keys_folder,
     picture,
     snapshot,
@@ -53,7 +53,7 @@ def test_a_table_of_others(tmp_path: Path) -> None:
     assert [episode.jpeg(step) for step in episode.steps] == [picture(n) for n in range(3)]
     assert (episode.header.control_hz, episode.header.source) == (10.0, "csv")
     assert {step.driver for step in episode.steps} == {"person"}
-    assert import_recording(folder, tmp_path / "slow", hz=5.0).notes[0].endswith("are left out.")
+    assert "are left out." in findings_of(import_recording(folder, tmp_path / "slow", hz=5.0))
     assert {step.clock_ns for step in all_of(tmp_path / "slow")[0].steps} == {None}
     assert snapshot(folder) == before
 
@@ -61,11 +61,12 @@ def test_a_table_of_others(tmp_path: Path) -> None:
 def test_a_table_of_others_with_states(tmp_path: Path) -> None:
     (tmp_path / "table").mkdir()
     (tmp_path / "table/steps.csv").write_text(
-        "Angle;throttle;state/speed;lap;done\n0,5;1;2,25;7;0\n-1;0;nan;8;1\n0;oops;1;8;0\n"
+        "Angle;throttle;state/speed;lap;done\n0.5;1;2.25;7;0\n-1;0;nan;8;1\noops;0;1;8;0\n0,5;0;1;8;0\n"
     )
     done = import_recording(tmp_path / "table", tmp_path / "data", hz=20.0)
-    assert done.notes == ("Columns that are not imported: lap.",)
-    assert "line 4: it is not a valid step (Expected `float`" in done.left_out[0]
+    text = findings_of(done)
+    assert "note: Columns that are not imported: lap." in text
+    assert "line 4 of table, line 5 of table: it is not a valid step (Expected `float`" in text
     (episode,) = all_of(tmp_path / "data")
     assert Layout.from_json(episode.header.action_layout).names == ("steering", "throttle")
     assert [step.action for step in episode.steps] == [(0.5, 1.0), (-1.0, 0.0)]
@@ -202,7 +203,7 @@ def test_states_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.Mon
     assert Layout.from_json(head.state_layout).names == ("at", "goal/0", "goal/1")
     (action,) = Layout.from_json(head.action_layout)
     assert (action.low, action.high) == (1.0, 3.0)
-    read = [row.step for row in episode.rows if row.jpeg is None]
+    read = [record.step for record in episode.records]
     assert [step.action for step in read] == [(1.0,), (2.0,), (3.0,)]
     assert [step.state for step in read] == [(0.0, 0.5, 0.5), (1.0, 0.5, 0.5), (2.0, 0.5, 0.5)]
     assert read[-1].terminated
@@ -241,14 +242,14 @@ def test_a_source_that_is_not_whole_is_refused_or_collected(tmp_path: Path) -> N
     records = [r | {"_timestamp_ms": 1000 + 50 * n} for n, r in enumerate(_RECORDS[:3] * 4)]
     folder = tub_folder(tmp_path / "tub", records)
     (folder / "images/4_cam_image_array_.jpg").write_bytes(b"")
-    with pytest.raises(DemosError, match=r"is incomplete .*1 record with an empty image: 4"):
-        list(chain.from_iterable(episode.rows for episode in import_episodes(folder)))
+    with pytest.raises(DemosError, match=r"is incomplete .*record 4: an empty image"):
+        list(import_episodes(folder))
     with pytest.raises(DemosError, match="import it with `shapechanger demos import`"):
         load_dataset(folder)
     context = ImportContext()
     (episode,) = import_episodes(folder, context=context)
-    assert len(list(episode.rows)) == 11
-    assert context.left_out_lines() == ["1 record with an empty image: 4"]
+    assert len(list(episode.records)) == 11
+    assert findings_of(context) == "left out: record 4: an empty image"
     csv = tmp_path / "csv"
     drive(tmp_path / "data")
     export_recording(tmp_path / "data", csv, "csv")

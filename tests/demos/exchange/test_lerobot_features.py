@@ -10,8 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from shapechanger.demos.exchange import ImportContext, import_recording
-from shapechanger.demos.exchange.lerobot import FORMAT
+from shapechanger.demos.exchange import import_recording
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 from tests.demos.exchange.lerobot_set import (
@@ -23,7 +22,7 @@ from tests.demos.exchange.lerobot_set import (
     write_set,
     write_video,
 )
-from tests.demos.exchange.small import all_of, image_file
+from tests.demos.exchange.small import all_of, findings_of, image_file
 
 AXES = ["height", "width", "channels"]
 COUNT = 16
@@ -48,14 +47,9 @@ def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
         rows[4]["action"] = [4.0, float("nan")]
 
     folder = write_set(tmp_path / "set", rows=spoil, **stored(images))
-    context = ImportContext()
-    assert FORMAT.read is not None
-    rows = [list(episode.rows) for episode in FORMAT.read(folder, context)]
-    assert [[row.jpeg is not None for row in episode] for episode in rows] == [
-        [True, False, False, False, True, False, False],
-        [True, False, False, False] * 2,
-    ]
-    assert context.left_out_lines() == ["1 step with an action that is not finite: 4 of episode 0"]
+    done = import_recording(folder, tmp_path / "back")
+    assert [len(list(one.path.glob("frames/*"))) for one in all_of(tmp_path / "back")] == [2, 2]
+    assert findings_of(done) == "left out: step 4 of episode 0: its action is not finite"
 
 
 @pytest.mark.parametrize(
@@ -87,15 +81,13 @@ def test_other_features_are_named(tmp_path: Path) -> None:
     )
     pairs, context = pairs_of(folder)
     assert sum(map(len, pairs)) == COUNT
-    assert context.left_out_lines() == [
-        "3 features with images of an unknown kind or of depth: observation.images.depth "
-        "(uint16, 4 x 4 x 1), observation.points (float32, 480 x 640 x 3), observation.scan "
-        "(depth16, 480 x 640)",
-        "1 column that meta/info.json does not describe: extra",
-    ]
-    assert context.notes == [
-        "The feature observation.words (string, 1) is not imported.",
-        "The feature next.success (bool, 1) is not imported.",
+    assert findings_of(context).splitlines() == [
+        "left out: observation.images.depth (uint16, 4 x 4 x 1), observation.points (float32, "
+        "480 x 640 x 3), observation.scan (depth16, 480 x 640): images of an unknown kind or of "
+        "depth",
+        "note: The feature observation.words (string, 1) is not imported.",
+        "note: The feature next.success (bool, 1) is not imported.",
+        "left out: extra: a column that meta/info.json does not describe",
     ]
 
 
@@ -104,7 +96,7 @@ def test_a_camera_of_depth_is_not_chosen(tmp_path: Path, flag: str) -> None:
     depth = {"dtype": "video", "shape": [SIZE, SIZE, 1], "names": AXES, "info": {flag: True}}
     folder = write_set(tmp_path / "set", features={"observation.images.depth": depth})
     _, context = pairs_of(folder)
-    assert "1 feature with images of an unknown kind or of depth" in context.left_out_lines()[0]
+    assert "depth (video, 32 x 32 x 1): images of an unknown kind or" in findings_of(context)
     with pytest.raises(UnknownName, match="There are: front"):
         pairs_of(folder, "depth")
 
@@ -140,7 +132,7 @@ def test_names_and_units_of_values(
     assert about.created == ""  # Unknown.
     layout = Layout.from_json(about.action_layout)
     assert (layout.names, [feature.unit for feature in layout]) == (expected, ["rad", "deg"])
-    assert any("names of action do not fit its 2 values" in note for note in done.notes) == noted
+    assert ("names of action do not fit its 2 values" in findings_of(done)) == noted
 
 
 def test_one_of_several_cameras(tmp_path: Path) -> None:
@@ -183,7 +175,7 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
         ({"info": {"data_path": "{chunk_index:99d}"}}, "There is no .*99d"),
         ({"info": {"data_path": None}}, "Expected `str`, got `null`.*data_path"),
         ({"info": {"data_path": "**/*"}}, r"There is no .*\*"),
-        ({"info": {"video_path": "/etc/{video_key}"}}, "video cannot be read.*leaves the folder"),
+        ({"info": {"video_path": "/etc/{video_key}"}}, "episode 0.*leaves the folder"),
         (
             {"features": {"action": {"dtype": "string", "shape": [1]}}},
             "no numeric feature 'action'",
@@ -192,14 +184,14 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
         ({"features": {"observation.x": NUMBER}}, "no column 'observation.x'"),
         (
             {"features": {CAMERA: {"dtype": "video", "shape": [16, SIZE, 3]}}},
-            r"have \(32, 32\) pixels, not \(32, 16\)",
+            r"of \(32, 32\) pixels, not \(32, 16\)",
         ),
         (
             {"features": {CAMERA: {"dtype": "video", "shape": [7]}}},
             "the shape .7., not",
         ),
         (spoil(DATA, size=300), "not an intact Parquet file"),
-        (spoil(VIDEO, PLAYLIST), "video cannot be read: .*is damaged"),
+        (spoil(VIDEO, PLAYLIST), "episode 0.*is damaged"),
         (outside, "leaves the folder"),
         (lambda folder: shutil.rmtree(folder / "meta/episodes"), "not have each episode once"),
     ],

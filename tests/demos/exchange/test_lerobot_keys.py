@@ -14,8 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shapechanger.demos.exchange import pictures
-from shapechanger.errors import DemosError
+from shapechanger.demos.exchange import video
 from tests.demos.exchange.lerobot_set import (
     CAMERA,
     DATA,
@@ -26,6 +25,7 @@ from tests.demos.exchange.lerobot_set import (
     write_set,
     write_video,
 )
+from tests.demos.exchange.small import findings_of
 
 BOTH = [[(n, n) for n in range(8)], [(n, n) for n in range(8, 16)]]
 
@@ -63,8 +63,7 @@ def test_pictures_are_found_by_their_time(
 ) -> None:
     pairs, context = pairs_of(write_set(tmp_path / "set", **options))
     assert pairs == expected
-    assert not context.left_out
-    assert not context.warnings
+    assert not context.findings
 
 
 @settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -89,7 +88,7 @@ def test_no_lost_picture_shifts_the_others(
     assert all(step == picture for episode in pairs for step, picture in episode)
     whole = [all(n not in lost for n in range(first, first + 8)) for first in (0, 8)]
     assert len(pairs) <= sum(whole)
-    assert len(pairs) == sum(whole) or context.left_out
+    assert len(pairs) == sum(whole) or context.findings
 
 
 def place(number: int, **changes: Any) -> Any:
@@ -125,17 +124,21 @@ def every(change: Any) -> Any:
         ({"options": ["-output_ts_offset", "0.5"]}, [], "shows 0.5 to 1.3 s where"),
         # Images after a lost one moved up, and nothing says which one is lost.
         ({"pictures": [*range(5), *range(6, 16)]}, [], "shows 0 to 0.75 s where"),
-        ({"places": place(0, to_timestamp=0.35)}, [1], "without an image within 0.1 ms"),
-        ({"places": place(1, from_timestamp=0.35)}, [], "overlap.*: 0, 1"),
+        ({"places": place(0, to_timestamp=0.35)}, [1], "lacks an image within 0.1 ms"),
+        (
+            {"places": place(1, from_timestamp=0.35)},
+            [],
+            "episode 0, episode 1: Parts of .* overlap",
+        ),
         (
             {"places": place(1, from_timestamp=0.42, to_timestamp=0.82)},
             [0],
-            "without an image within 0.1 ms",
+            "lacks an image within 0.1 ms",
         ),
-        ({"video_fps": 10, "pictures": range(8)}, [], "without an image within 0.1 ms"),
+        ({"video_fps": 10, "pictures": range(8)}, [], "lacks an image within 0.1 ms"),
         # The keys.
         *(
-            ({"rows": change}, [1], "keys of episode 0 do not fit meta/episodes.*: 0 of episode 0")
+            ({"rows": change}, [1], "episode 0: .*keys of episode 0 do not fit meta/episodes")
             for change in (
                 row(3, frame_index=4),
                 row(4, timestamp=np.float32(0.2002)),
@@ -151,10 +154,14 @@ def every(change: Any) -> Any:
         ({"rows": row(9, episode_index=None)}, [0], "keys of episode 1 do not fit"),
         # The entries.
         ({"places": place(0, length=7)}, [1], "keys of episode 0"),
-        ({"places": place(0, length=9)}, [1], "without an image within 0.1 ms of each step: 0"),
+        (
+            {"places": place(0, length=9)},
+            [1],
+            "episode 0: .* lacks an image within 0.1 ms of each step",
+        ),
         ({"places": place(1, dataset_from_index=7)}, [0], "keys of episode 1"),
-        ({"places": lambda entries: entries[:1]}, [0], "meta/episodes does not have: 1"),
-        ({"places": lambda entries: entries[1:]}, [1], "meta/episodes does not have: 0"),
+        ({"places": lambda entries: entries[:1]}, [0], "episode 1: meta/episodes does not have it"),
+        ({"places": lambda entries: entries[1:]}, [1], "episode 0: meta/episodes does not have it"),
         ({"rows": lambda rows: rows[:8]}, [0], "has 0 rows of 8 of episode 1"),
     ],
 )
@@ -164,14 +171,14 @@ def test_contradictions_are_left_out(
     """An episode whose keys disagree is not imported, and the report states by how much."""
     pairs, context = pairs_of(write_set(tmp_path / "set", **options))
     assert pairs == [BOTH[number] for number in episodes]
-    assert re.search(reason, "\n".join(context.left_out_lines())), context.left_out_lines()
+    assert re.search(reason, findings_of(context)), context.findings
 
 
 @pytest.mark.parametrize(
     ("options", "warning"),
     [
         ({"info": {"total_episodes": 3}}, "has 3 episodes with 16 steps, and meta/episodes 2"),
-        ({"pictures": range(18)}, r"more images in .*, which shows 0 to 0\.9 s where"),
+        ({"pictures": range(18)}, r"more images: .* shows 0 to 0\.9 s where"),
         ({"info": {"total_frames": 15}}, "has 2 episodes with 15 steps, and meta/episodes 2"),
     ],
 )
@@ -181,21 +188,20 @@ def test_contradictions_that_change_no_step_are_reported(
     folder = write_set(tmp_path / "set", **options)
     pairs, context = pairs_of(folder)
     assert pairs == BOTH
-    with pytest.raises(DemosError, match=warning):
-        context.require_whole(folder)
+    assert re.search(f"warning: .*{warning}", findings_of(context))
 
 
 def test_rows_in_several_files(tmp_path: Path) -> None:
-    """Rows are in the file that the entry names, and what is missing there is left out."""
+    """Rows are in the file that the entry names; an episode that is not whole is left out."""
     folder = write_set(tmp_path / "set", places=place(0, **{"data/file_index": 1}))
     table = pq.read_table(folder / DATA)
     second = (folder / DATA).with_name("file-001.parquet")
-    for at, first in ((8, BOTH[0]), (5, BOTH[0][:5])):
+    for at, episodes in ((8, BOTH), (5, BOTH[1:])):
         pq.write_table(table.slice(at), folder / DATA)
         pq.write_table(table.slice(0, at), second)
         pairs, context = pairs_of(folder)
-        assert pairs == [first, BOTH[1]]
-        assert ("has 5 rows of 8" in "".join(context.left_out_lines())) == (at == 5)
+        assert pairs == episodes
+        assert ("has 5 rows of 8" in findings_of(context)) == (at == 5)
 
 
 def test_a_video_that_is_cut_off(tmp_path: Path) -> None:
@@ -206,7 +212,7 @@ def test_a_video_that_is_cut_off(tmp_path: Path) -> None:
     (folder / VIDEO).write_bytes(content[:-40])
     pairs, context = pairs_of(folder)
     assert not pairs
-    assert "cut off" in context.left_out_lines()[0]
+    assert "cut off" in findings_of(context)
 
 
 @settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -225,7 +231,7 @@ def test_no_damage_shifts_the_pictures(
     (folder / VIDEO).write_bytes(content)
     pairs, context = pairs_of(folder)
     shifted = any(step != picture for episode in pairs for step, picture in episode)
-    assert not shifted or context.warnings
+    assert not shifted or "warning: " in findings_of(context)
 
 
 @pytest.mark.parametrize(("table", "offset"), [(b"stsz", 12), (b"elst", 8), (b"stsc", 16)])
@@ -238,11 +244,11 @@ def test_a_video_that_claims_more_than_it_holds(tmp_path: Path, table: bytes, of
     (folder / VIDEO).write_bytes(content)
     pairs, context = pairs_of(folder)
     assert not pairs
-    assert "claims to have more than" in context.left_out_lines()[0]
+    assert "claims to have more than" in findings_of(context)
 
 
 def test_a_damaged_image(tmp_path: Path) -> None:
-    """The rest of its episode is left out, and the next episode is not."""
+    """Its episode is left out, and the next episode is not."""
     folder = write_set(tmp_path / "set", options=["-g", "1", "-movflags", "+faststart"])
     with av.open(str(folder / VIDEO)) as file:
         image = list(file.demux(video=0))[5]
@@ -250,17 +256,17 @@ def test_a_damaged_image(tmp_path: Path) -> None:
     content[image.pos + 5 : image.pos + image.size] = b"\xff" * (image.size - 5)
     (folder / VIDEO).write_bytes(content)
     pairs, context = pairs_of(folder)
-    assert pairs == [BOTH[0][:5], BOTH[1]]
-    assert "is damaged" in context.left_out_lines()[0]
+    assert pairs == BOTH[1:]
+    assert "is damaged" in findings_of(context)
 
 
 def test_a_video_of_too_many_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit holds before an image is decoded, whatever the file says."""
     folder = write_set(tmp_path / "set")
-    monkeypatch.setattr(pictures, "MAX_PIXELS", SIZE * SIZE - 1)
+    monkeypatch.setattr(video, "MAX_PIXELS", SIZE * SIZE - 1)
     pairs, context = pairs_of(folder)
     assert not pairs
-    assert "is damaged" in context.left_out_lines()[0]
+    assert "is damaged" in findings_of(context)
 
 
 def test_one_damaged_file_of_several(tmp_path: Path) -> None:
@@ -276,8 +282,7 @@ def test_one_damaged_file_of_several(tmp_path: Path) -> None:
     assert pairs == BOTH[:1]
     write_video(folder / second, range(8, 16), 20)
     assert pairs_of(folder)[0] == BOTH
-    with pytest.raises(DemosError, match=r"video cannot be read.*file-001"):
-        context.require_whole(folder)
+    assert "file-001.mp4 is damaged" in findings_of(context)
 
 
 @pytest.mark.parametrize("named", [0, 7])
@@ -289,4 +294,4 @@ def test_rows_are_found_in_a_file_that_is_not_named(tmp_path: Path, named: int) 
     pq.write_table(table.slice(8), (folder / DATA).with_name("file-001.parquet"))
     pairs, context = pairs_of(folder)
     assert pairs == [[(n, n) for n in range(8)], [(n, n) for n in range(8, 16)]]
-    assert not context.left_out
+    assert not context.findings

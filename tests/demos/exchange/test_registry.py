@@ -18,7 +18,7 @@ DOCS = Path(__file__).parents[3] / "docs/exchange.md"
 
 FORMAT = """
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import ExchangeEpisode, ExchangeStep, Format
+from shapechanger.demos.exchange import ExchangeEpisode, Format, Record
 from shapechanger.layout import Feature, Layout
 
 LAYOUT = Layout((Feature("speed", "m/s"),))
@@ -26,19 +26,19 @@ LAYOUT = Layout((Feature("speed", "m/s"),))
 
 def read(folder, context):
     header = EpisodeHeader(action_layout=LAYOUT.to_json(), control_hz=context.hz or 10.0)
-    rows = []
+    records = []
     for line in (folder / "speeds.txt").read_text().split():
         try:
             step = Step(action=(float(line),), driver="person")
         except ValueError:
-            context.leave_out("line", "that is not a number", line)
+            context.report("left out", "not a number", line)
             continue
-        rows.append(ExchangeStep(step=step, jpeg=None))
-    yield ExchangeEpisode(header=header, rows=rows, name=str(folder))
+        records.append(Record(step=step))
+    yield ExchangeEpisode(header=header, records=records, name=str(folder))
 
 
 def write(episodes, folder, context):
-    speeds = [str(row.step.action[0]) for episode in episodes for row in episode.rows]
+    speeds = [str(row.step.action[0]) for episode in episodes for row in episode.records]
     (folder / "speeds.txt").write_text("\\n".join(speeds))
     return len(speeds)
 
@@ -82,7 +82,7 @@ def test_a_format_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert ended.value.code == 3
     output = capsys.readouterr()
     assert "(speeds): 1 episode, 2 steps, 0 images" in output.out
-    assert output.err == "left out 1 line that is not a number: fast\n"
+    assert output.err == "left out: fast: not a number\n"
     (episode,) = all_of(tmp_path / "data")
     assert [step.action for step in episode.steps] == [(0.5,), (1.5,)]
     assert episode.header.control_hz == 5.0

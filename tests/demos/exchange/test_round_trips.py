@@ -20,6 +20,7 @@ from tests.demos.exchange.small import (
     all_of,
     content_of,
     drive,
+    findings_of,
     header,
     picture,
     record,
@@ -83,7 +84,6 @@ def _headers(draw: st.DrawFn) -> dict[str, Any]:
         ((40, 32), True, False),
         ((40, 32), False, False),
         (None, True, False),
-        ((16, 8), True, False),
         ((40, 32), True, True),
     ],
 )
@@ -165,7 +165,8 @@ def test_dropped_steps_are_not_exported(tmp_path: Path) -> None:
     path = record(tmp_path / "data", header(), steps)
     edit(path, Drop(0, 0, "bad"))
     done = export_recording(tmp_path / "data", tmp_path / "csv", "csv")
-    assert (done.steps, done.left_out) == (3, ("1 dropped step; --dropped includes them",))
+    assert done.steps == 3
+    assert "Dropped steps are left out (1); --dropped" in findings_of(done)
     import_recording(tmp_path / "csv", tmp_path / "back")
     (after,) = all_of(tmp_path / "back")
     assert [step.action[0] for step in after.kept] == [1.0, 2.0, 3.0]
@@ -192,13 +193,10 @@ def test_steps_that_do_not_follow_each_other_are_separate_episodes(
     assert export_recording(tmp_path / "data", tmp_path / "csv", "csv").episodes == 1
     done = export_recording(tmp_path / "data", tmp_path / folder, name)
     assert (done.episodes, done.steps) == (3, 7)
-    assert done.left_out[0].startswith("1 dropped step")
-    split = "split at 1 gap of excluded or missing steps and 1 pause (up to 7.17 s): 1 became 3."
-    assert done.notes[0].endswith(split)
-    off = [note for note in done.notes if "off by more than half a period" in note]
-    assert [("in 1 of 3 episodes, by up to 0.09 s" in note) for note in off] == (
-        [True] if name == "lerobot" else []
-    )
+    text = findings_of(done)
+    assert "Dropped steps are left out (1)" in text
+    assert "where steps are excluded or missing: 1 became 3." in text
+    assert ("in 1 of 3 episodes, by up to 0.09 s" in text) == (name == "lerobot")
     import_recording(tmp_path / folder, tmp_path / "back")
     back = all_of(tmp_path / "back")
     actions = [[round(10 * step.action[0]) for step in one.steps] for one in back]

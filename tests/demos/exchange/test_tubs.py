@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from shapechanger.demos.exchange import Converted, import_recording
 from shapechanger.demos.exchange.format import measured_hz
 from shapechanger.errors import DemosError, UnknownName
-from tests.demos.exchange.small import all_of, picture, tub_folder
+from tests.demos.exchange.small import all_of, findings_of, picture, tub_folder
 
 T0_MS = 1_700_000_000_000
 NO_IMAGE: dict[str, Any] = {"cam/image_array": None}
@@ -70,29 +70,13 @@ def test_deletions_go_by_index(
     )
     episodes, done = imported(folder)
     assert episodes == [[n for n in range(first, first + count) if n not in deleted]]
-    assert not done.left_out
+    assert "left out" not in findings_of(done)
 
 
-def test_a_tub_of_version_1(tmp_path: Path) -> None:
-    """Deletions go by the numbers of the records, and a restart of the car begins an episode."""
-    folder = tmp_path / "tub"
-    folder.mkdir()
-    for n in range(3, 15):
-        (folder / f"{n}_cam.jpg").write_bytes(picture(n))
-        fields = {"cam/image_array": f"{n}_cam.jpg", "user/angle": n / 100, "user/throttle": 0.5}
-        fields["milliseconds"] = 50 * (n - 3 if n < 13 else n - 13)
-        (folder / f"record_{n}.json").write_text(json.dumps(fields))
-    (folder / "meta.json").write_text(json.dumps({"inputs": [], "types": []}))
-    (folder / "exclude.json").write_text("[5, 6, 40]")
-    episodes, done = imported(folder)
-    assert episodes == [[3, 4, *range(7, 13)], [13, 14]]
-    assert done.notes[0] == "2 records deleted in the tub, and not imported."
-    first, _ = all_of(next(path for path in tmp_path.iterdir() if path != folder))
-    assert first.header.control_hz == pytest.approx(20.0)
-    assert {step.wall_ns for step in first.steps} == {None}  # Times are relative to the start.
-    (folder / "exclude.json").write_text('{"5": true}')
-    with pytest.raises(DemosError, match=r"exclude.json is damaged: Expected `array`"):
-        imported(folder)
+def test_a_tub_of_version_1_is_converted_by_donkeycar(tmp_path: Path) -> None:
+    (tmp_path / "record_3.json").write_text("{}")
+    with pytest.raises(DemosError, match="version 1: Donkeycar's convert_to_tub_v2 converts it"):
+        import_recording(tmp_path, tmp_path.with_name("data"))
 
 
 def lines(change: Callable[[list[bytes]], list[bytes]]) -> Callable[[Path], object]:
@@ -134,36 +118,40 @@ def in_manifest(old: str, new: str) -> Callable[[Path], object]:
     [
         (
             lambda f: (f / "images/3_cam_image_array_.jpg").unlink(),
-            "cannot be read (No such file or directory): 3",
+            "record 3: an image that cannot be read (No such file or directory)",
             {3},
         ),
         (
             lambda f: (f / "images/0_cam_image_array_.jpg").write_bytes(picture(0, 80, 32)),
-            "1 record with an image of 80 x 32 pixels, and not 40 x 32: 0",
+            "record 0: an image of 80 x 32 pixels, and not 40 x 32",
             {0},
         ),
-        (lines(lambda ls: [*ls, bytes(512)]), "1 line with damaged JSON", set()),
+        (lines(lambda ls: [*ls, bytes(512)]), "line 7: damaged JSON", set()),
         (lines(lambda ls: [*ls[:-1], ls[-1][:-9]]), "catalog_0.catalog, line 6", {5}),
-        (lines(lambda ls: [*ls, ls[4]]), "the _index of another record: 4, 4", {4}),
-        (field("_index", "x"), "2 lines with damaged JSON or without a valid _index", {0, 4}),
-        (field("_index", 2), "with the _index of another record: 2, 2, 2", {0, 2, 4}),
-        (field("user/angle", 1.5), "(Expected `float` <= 1.0 - at `$.user/angle`): 0, 4", {0, 4}),
+        (lines(lambda ls: [*ls, ls[4]]), "record 4: the _index of several records", {4}),
+        (
+            field("_index", "x"),
+            "line 1, catalog_0.catalog, line 5: damaged JSON, or no valid _index",
+            {0, 4},
+        ),
+        (field("_index", 2), "record 2: the _index of several records", {0, 2, 4}),
+        (field("user/angle", 1.5), "(Expected `float` <= 1.0 - at `$.user/angle`)", {0, 4}),
         (field("user/angle", True), "got `bool` - at `$.user/angle`)", {0, 4}),
         (field("pilot/angle", math.nan), "invalid value (Expected `float` >= -1.0", {0, 4}),
         (field("_timestamp_ms", "soon"), "got `str` - at `$._timestamp_ms`)", {0, 4}),
-        (field("user/throttle", None), "without an action in the mode 'user'", {0, 4}),
-        (field("user/mode", "local"), "without an action in the mode 'local'", {0, 4}),
-        (field("cam/image_array", None), "2 records without an image: 0, 4", {0, 4}),
+        (field("user/throttle", None), "record 0, record 4: no action in the mode 'user'", {0, 4}),
+        (field("user/mode", "local"), "no action in the mode 'local'", {0, 4}),
+        (field("cam/image_array", None), "record 0, record 4: no image", {0, 4}),
         (field("cam/image_array", "../1.jpg"), "an image name that leaves the folder", {0, 4}),
         (field("cam/image_array", "a\0b.jpg"), "an image name that leaves the folder", {0, 4}),
         (
             field("cam/image_array", "1_cam_image_array_.jpg"),
-            "3 records with the image of another record: 0, 1, 4",
+            "record 0, record 1, record 4: the image of several records",
             {0, 1, 4},
         ),
         (
             lambda f: (f / "catalog_1.catalog").unlink(),
-            "1 catalog that cannot be read",
+            "catalog_1.catalog: There is no",
             {6, 7, 8, 9},
         ),
         (in_manifest("catalog_1", "../catalog_1"), "leaves the folder", {6, 7, 8, 9}),
@@ -174,12 +162,11 @@ def test_the_rest_of_a_damaged_tub_is_imported(
 ) -> None:
     folder = tub_folder(tmp_path / "tub", records(10), per_catalog=6)
     spoil(folder)
-    with pytest.raises(DemosError, match="is incomplete") as caught:
+    with pytest.raises(DemosError, match="is incomplete"):
         imported(folder, strict=True)
-    assert expected in str(caught.value)
     episodes, done = imported(folder)
     assert [n for episode in episodes for n in episode] == [n for n in range(10) if n not in lost]
-    assert expected in "; ".join(done.left_out)
+    assert expected in findings_of(done)
 
 
 def test_catalogs_in_another_order(tmp_path: Path) -> None:
@@ -190,11 +177,11 @@ def test_catalogs_in_another_order(tmp_path: Path) -> None:
     in_manifest('"deleted_indexes": []', '"deleted_indexes": [2, 8, 9]')(folder)
     episodes, done = imported(folder)
     assert episodes == [[0, 1, 3, 4, 5]]
-    assert done.warnings == (
-        "The _index does not always rise: the records are read in its order.",
-        "1 of the deleted indexes belong to no record: 9.",
-    )
-    assert done.notes[0] == "3 of the records 0 to 8 are in no catalog."
+    assert findings_of(done).splitlines()[:3] == [
+        "warning: The _index does not always rise: the records are read in its order.",
+        "note: 3 of the records 0 to 8 are in no catalog.",
+        "warning: 1 of the deleted indexes belong to no record: 9.",
+    ]
 
 
 def test_pictures_of_other_records(tmp_path: Path) -> None:
@@ -206,7 +193,7 @@ def test_pictures_of_other_records(tmp_path: Path) -> None:
     for n in range(8):
         (folder / f"images/{n}_cam_image_array_.jpg").write_bytes(picture(n))
     _, done = imported(folder)
-    assert done.warnings == ("6 records with the image of another number: 0, 1, 2, and 3 more.",)
+    assert "and 3 more: the image of another number" in findings_of(done)
 
 
 @pytest.mark.parametrize("lines", [0, 4])
@@ -221,7 +208,9 @@ def test_a_damaged_manifest(tmp_path: Path, lines: int) -> None:
 
 def test_no_record_is_left(tmp_path: Path) -> None:
     out = tmp_path / "data"
-    with pytest.raises(DemosError, match=r"nothing to import .*: 3 records without an action"):
+    with pytest.raises(
+        DemosError, match=r"nothing to import .*: record 0, record 1, record 2: no action"
+    ):
         import_recording(tub_folder(tmp_path / "a", [{"speed": 1.0}] * 3), out)
     with pytest.raises(DemosError, match="There is nothing to import"):
         import_recording(tub_folder(tmp_path / "b", records(3), [0, 1, 2]), out)
@@ -256,8 +245,8 @@ def test_rates_by_times(
     _, done = imported(folder, hz=hz)
     (episode,) = all_of(next(p for p in tmp_path.iterdir() if p != folder))
     assert episode.header.control_hz == pytest.approx(rate, rel=2e-3)
-    assert finding in "".join((*done.warnings, *done.notes))
-    if "by their times" in "".join((*done.warnings, *done.notes)):
+    assert finding in findings_of(done)
+    if "by their times" in findings_of(done):
         assert {step.clock_ns for step in episode.steps} == {None}
         assert episode.header.created == ""
     else:  # The ten deleted records took time, too.
@@ -293,8 +282,8 @@ def test_times_that_jump(tmp_path: Path) -> None:
     session = {"_session_id": "s", "cam/image_array": None}
     episodes, done = imported(tub_folder(tmp_path / "tub", [r | session for r in made]))
     assert episodes == [[*range(10)], [*range(10, 20)], [*range(20, 30)]]
-    assert "after 1 pause, of 120.05 s at most and 120.05 s in all" in done.notes[0]
-    assert done.warnings[0].startswith("Time runs backwards by up to 3599.95 s at 20:")
+    assert "note: record 10: an episode begins after a pause" in findings_of(done)
+    assert "warning: record 20: time runs backwards" in findings_of(done)
 
 
 def test_sessions_at_different_rates(tmp_path: Path) -> None:
@@ -302,8 +291,8 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
     for n, record in enumerate(made):
         record |= {"_session_id": n // 12, "_timestamp_ms": T0_MS + n * (50 if n < 12 else 100)}
     folder = tub_folder(tmp_path / "tub", made)
-    (warning,) = imported(folder)[1].warnings
-    assert warning.startswith("The drives have from 10 to 20 steps a second: a policy learns")
+    text = findings_of(imported(folder)[1])
+    assert text.startswith("warning: The drives have from 10 to 20 steps a second: a policy learns")
     with pytest.raises(DemosError, match="--hz must be positive"):
         imported(folder, hz=-1.0)
 
@@ -328,7 +317,7 @@ def test_cameras_of_other_names(tmp_path: Path) -> None:
         imported(folder)
     _, done = imported(folder, camera="cam/right")
     assert done.pictures == 3
-    assert done.notes == ("Columns that are not imported: cam/left.",)
+    assert findings_of(done) == "note: Columns that are not imported: cam/left."
     with pytest.raises(UnknownName, match="Did you mean 'cam/left'"):
         imported(folder, camera="cam/lefty")
 
@@ -338,9 +327,9 @@ def test_depth_and_lists_are_named(tmp_path: Path) -> None:
     extra = {"cam/depth_array": "d.png", "lidar": [0.5], "imu/gyr_z": 2.5, "gear": "low"}
     made = [r | extra for r in records(3)]
     _, done = imported(tub_folder(tmp_path / "tub", made, inputs=inputs))
-    assert done.notes == ("Columns that are not imported: cam/depth_array, lidar, gear.",)
+    assert "not imported: cam/depth_array, lidar, gear." in findings_of(done)
     _, done = imported(tub_folder(tmp_path / "deep", [r | NO_IMAGE for r in made], inputs=inputs))
-    assert "those of 16 bits are not imported" in done.warnings[0]
+    assert "those of 16 bits are not imported" in findings_of(done)
 
 
 def test_unknown_times_and_starts(tmp_path: Path) -> None:
@@ -348,11 +337,11 @@ def test_unknown_times_and_starts(tmp_path: Path) -> None:
     made = records(4, **NO_IMAGE)
     made[2]["_timestamp_ms"] = None
     _, done = imported(tub_folder(tmp_path / "tub", made))
-    assert "1 of the 4 records from 0 have no valid time" in done.warnings[0]
+    assert "record 0: some records lack a time" in findings_of(done)
     for record in made:
         del record["_timestamp_ms"]
     folder = tub_folder(tmp_path / "none", made)
     _, done = imported(folder)
-    assert done.notes == ("The rate is unknown and taken to be 20 Hz; --hz states it.",)
+    assert findings_of(done).startswith("note: The rate is unknown and taken to be 20 Hz;")
     (episode,) = all_of(next(p for p in tmp_path.iterdir() if p.name.startswith("none-data")))
     assert episode.header.created == ""

@@ -310,13 +310,9 @@ class DemosImport:
             f"read {self.source} ({done.format}): {counted(done.episodes, 'episode')}, "
             f"{counted(done.steps, 'step')}, {counted(done.pictures, 'image')}\nwrote {self.out}"
         )
-        for note in done.notes:
-            say(f"note: {note}")
-        for warning in done.warnings:
-            say(f"warning: {warning}", stderr=True)
-        for line in done.left_out:
-            say(f"left out {line}", stderr=True)
-        if done.left_out:
+        for kind, text in done.findings:
+            say(f"{kind}: {text}", stderr=kind != "note")
+        if any(kind == "left out" for kind, _ in done.findings):
             sys.exit(PARTLY_IMPORTED)
 
 
@@ -345,10 +341,8 @@ class DemosExport:
             f"wrote {self.out} ({done.format}): {counted(done.steps, 'step')} of "
             f"{counted(done.episodes, 'episode')}"
         )
-        for line in done.left_out:
-            say(f"left out {line}")
-        for note in done.notes:
-            say(f"note: {note}")
+        for kind, text in done.findings:
+            say(f"{kind}: {text}")
         if done.format == "lerobot":
             say(f"load it with LeRobotDataset({self.out.name!r}, root={str(self.out)!r})")
         if done.format == "minari":

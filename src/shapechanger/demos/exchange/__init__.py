@@ -2,9 +2,9 @@
 
 A format is one file: it reads folders into `ExchangeEpisode`s, writes these, and declares a
 `Format` (`format`); `formats` finds our own and those of the entry points `shapechanger.formats`.
-`format.COLUMNS` names each column of a step, and rates are measured there. `files` and `pictures`
-load and check what strangers made, within one budget. Sources are never changed, and targets appear
-atomically.
+`format.COLUMNS` names each column of a step. `files` and `video` load and check what strangers
+made, within one budget. What is not whole is left out here, with its name and the reason. Sources
+are never changed, and targets appear atomically.
 """
 
 from __future__ import annotations
@@ -37,11 +37,12 @@ from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
 from shapechanger.demos.exchange.files import new_folder
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
-    ExchangeStep,
     ExportContext,
+    Finding,
     Format,
     ImportContext,
-    counted,
+    Record,
+    whole_records,
 )
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.files import writing
@@ -49,10 +50,11 @@ from shapechanger.files import writing
 __all__ = [
     "Converted",
     "ExchangeEpisode",
-    "ExchangeStep",
     "ExportContext",
+    "Finding",
     "Format",
     "ImportContext",
+    "Record",
     "export_recording",
     "find_format",
     "formats",
@@ -92,18 +94,14 @@ class Converted:
         episodes: Number of episodes written.
         steps: Number of steps written.
         pictures: Number of images of an import.
-        left_out: What is left out, a line for each reason.
-        warnings: Contradictions in the source, as sentences.
-        notes: Further facts, and what an export changes, as sentences.
+        findings: What is left out, contradictions in the source, and what an export changes.
     """
 
     format: str
     episodes: int
     steps: int
     pictures: int = 0
-    left_out: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 def export_recording(
@@ -140,11 +138,18 @@ def export_recording(
     chosen = [(episode, episode.steps if dropped else episode.kept) for episode in read]
     if not any(steps for _, steps in chosen):
         raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
-    episodes = [_exchanged(episode, steps, episode.outcome) for episode, steps in chosen]
     notes: list[str] = []
     if form.consecutive:
         episodes = _consecutive(chosen, form, notes)
-        _require_alike(episodes, form.title)
+    else:
+        episodes = [_exchanged(episode, steps, episode.outcome) for episode, steps in chosen]
+    for episode in episodes:
+        for name in form.alike:
+            if getattr(episode.header, name) != getattr(episodes[0].header, name):
+                raise DemosError(
+                    f"{episode.name} differs from {episodes[0].name} in its {name}, but a "
+                    f"{form.title} dataset has one kind of episode: export each kind to its own."
+                )
     rewarded = all(step.reward is not None for episode in read for step in episode.kept)
     context = ExportContext(out=out, task=task, images=images, rewarded=rewarded)
     try:
@@ -152,10 +157,11 @@ def export_recording(
             steps = form.write(episodes, folder, context)
     except OverflowError as error:
         raise DemosError(f"A number in {data} is too large for {format}: {error}.") from error
-    left = sum(len(episode.steps) for episode in read) - steps
-    hint = "; --dropped includes them" if "dropped" in form.options else ""
-    left_out = (f"{counted(left, 'dropped step')}{hint}",) if left else ()
-    return Converted(format, len(episodes), steps, left_out=left_out, notes=tuple(notes))
+    if left := sum(len(episode.steps) for episode in read) - steps:
+        hint = "; --dropped includes them" if "dropped" in form.options else ""
+        notes.append(f"Dropped steps are left out ({left}){hint}.")
+    findings = tuple(Finding("note", note) for note in notes)
+    return Converted(format, len(episodes), steps, findings=findings)
 
 
 def _require_options(form: Format, **given: object) -> None:
@@ -177,21 +183,18 @@ def _exchanged(
             began = datetime.fromisoformat(header.created) + timedelta(seconds=since_s)
             header = replace(header, created=began.isoformat(timespec="milliseconds"))
 
-    def rows() -> Iterator[ExchangeStep]:
-        marks, frame = defaultdict[int, list[str]](list), ""
+    def records() -> Iterator[Record]:
+        marks, frame, jpeg = defaultdict[int, list[str]](list), "", None
         for mark in episode.marks:
             marks[mark.step].append(mark.text)
         for step in steps:
-            yield ExchangeStep(
-                step=step,
-                jpeg=episode.jpeg(step) if step.frame != frame else None,
-                marks=tuple(marks[step.index]),
-                dropped=episode.excluded.get(step.index),
-            )
-            frame = step.frame
+            if step.frame != frame:
+                frame, jpeg = step.frame, episode.jpeg(step)
+            why = episode.excluded.get(step.index)
+            yield Record(step=step, jpeg=jpeg, marks=tuple(marks[step.index]), dropped=why)
 
     name = episode.path.name
-    return ExchangeEpisode(header=header, rows=rows(), name=name, outcome=outcome)
+    return ExchangeEpisode(header=header, records=records(), name=name, outcome=outcome)
 
 
 def _consecutive(
@@ -199,20 +202,12 @@ def _consecutive(
 ) -> list[ExchangeEpisode]:
     """Split episodes where steps are excluded or missing, and at pauses; add notes on it."""
     parts: list[ExchangeEpisode] = []
-    pauses_s: list[float] = []
     off_s: list[float] = []
-    missing = 0
     for episode, steps in episodes:
         hz, starts = episode.header.control_hz, [0] if steps else []
         for number, (one, two) in enumerate(pairwise(steps), 1):
-            passed_s = _passed_s(one, two)
-            if two.index != one.index + 1:
-                missing += 1
-            elif passed_s > longest_period_s(hz):
-                pauses_s.append(passed_s)
-            else:
-                continue
-            starts.append(number)
+            if two.index != one.index + 1 or _passed_s(one, two) > longest_period_s(hz):
+                starts.append(number)
         for start, end in pairwise([*starts, len(steps)]):
             run = steps[start:end]
             outcome = episode.outcome if end == len(steps) else ""
@@ -222,12 +217,9 @@ def _consecutive(
             off_s += [by_s] if by_s > 0.5 / hz else []
     whole = sum(bool(steps) for _, steps in episodes)
     if len(parts) > whole:
-        where = [f"{counted(missing, 'gap')} of excluded or missing steps"] if missing else []
-        if pauses_s:
-            where.append(f"{counted(len(pauses_s), 'pause')} (up to {max(pauses_s):.4g} s)")
         notes.append(
             f"{form.title} takes each step for the successor of the one before, so episodes are "
-            f"split at {' and '.join(where)}: {whole} became {len(parts)}."
+            f"split at pauses and where steps are excluded or missing: {whole} became {len(parts)}."
         )
     if off_s and not form.timed:
         notes.append(
@@ -246,23 +238,6 @@ def _passed_s(one: Step, two: Step, unknown_s: float = 0.0) -> float:
     return unknown_s
 
 
-def _require_alike(episodes: Sequence[ExchangeEpisode], title: str) -> None:
-    first = episodes[0]
-    for episode in episodes:
-        one, two = episode.header, first.header
-        for what, differ in {
-            "actions": one.actions != two.actions,
-            "states": one.states != two.states,
-            "images": one.image_size != two.image_size,
-            "steps a second": f"{one.control_hz:g}" != f"{two.control_hz:g}",
-        }.items():
-            if differ:
-                raise DemosError(
-                    f"{episode.name} has other {what} than {first.name}, but a {title} dataset has "
-                    "one kind of episode: export each kind to its own."
-                )
-
-
 def import_episodes(
     path: Path, format: str = "auto", context: ImportContext | None = None
 ) -> Iterator[ExchangeEpisode]:
@@ -271,8 +246,8 @@ def import_episodes(
     Args:
         path: A folder in one of the `formats`.
         format: Name of one of them, or "auto" to detect it.
-        context: Options; it collects what is left out. None to refuse a source that is incomplete
-            or contradicts itself.
+        context: Options; it collects the findings. None to refuse a source that is incomplete or
+            contradicts itself.
 
     Yields:
         The episodes; their steps are read when they are iterated.
@@ -282,13 +257,7 @@ def import_episodes(
         UnknownName: If there is no such format.
         MissingExtra: If a package that the format needs is not installed.
     """
-    context = ImportContext(strict=True) if context is None else context
-    for episode in _read(path, format, context)[1]:
-        if context.strict:
-            context.require_whole(path)
-        yield episode
-    if context.strict:
-        context.require_whole(path)
+    yield from _read(path, format, context or ImportContext(strict=True))[1]
 
 
 def import_recording(
@@ -326,24 +295,16 @@ def import_recording(
             if not episodes:  # One time begins the names of all folders, so that order is kept.
                 with suppress(ValueError):
                     now = datetime.fromisoformat(episode.header.created).astimezone(UTC)
-            written, added, shown = _write(episode, folder, now)
-            if context.left_out and not added:  # All its steps.
-                shutil.rmtree(written)
-                continue
-            episodes, steps, pictures = episodes + 1, steps + added, pictures + shown
-        if strict:
-            context.require_whole(path)
-        lines = context.left_out_lines()
+            added, shown = _write(episode, folder, now, context)
+            episodes, steps, pictures = episodes + bool(added), steps + added, pictures + shown
         if not episodes:
-            raise DemosError(
-                f"There is nothing to import in {path}: {'; '.join(lines) or 'empty'}."
-            )
-    findings = map(tuple, (lines, context.warnings, context.notes))
-    return Converted(found, episodes, steps, pictures, *findings)
+            about = [f"{kind}: {text}".removesuffix(".") for kind, text in context.findings]
+            raise DemosError(f"There is nothing to import in {path} ({'; '.join(about)}).")
+    return Converted(found, episodes, steps, pictures, context.findings)
 
 
 def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterator[ExchangeEpisode]]:
-    """Return the format of a folder, and an iterator over its episodes."""
+    """Return the format of a folder, and an iterator over its episodes of whole records."""
     names = [name for name, form in formats().items() if form.read]
     if format not in {"auto", *names}:
         raise UnknownName("format", format, ("auto", *names))
@@ -354,7 +315,8 @@ def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterato
     if context.hz is not None and not 0.0 < context.hz < math.inf:
         raise DemosError(f"--hz must be positive, got {context.hz:g}.")
     assert form.read is not None
-    return form.name, form.read(path, context)
+    read = form.read(path, context)
+    return form.name, (replace(one, records=whole_records(one, context)) for one in read)
 
 
 def find_format(path: Path) -> str:
@@ -386,32 +348,39 @@ def _formats_of(path: Path) -> list[str]:
     return [name for name, form in formats().items() if form.detect and form.detect(path)]
 
 
-def _write(episode: ExchangeEpisode, folder: Path, now: datetime) -> tuple[Path, int, int]:
-    """Write one episode of a recording; return its folder and numbers of steps and images."""
-    pictures = 0
+def _write(
+    episode: ExchangeEpisode, folder: Path, now: datetime, context: ImportContext
+) -> tuple[int, int]:
+    """Write one episode of a recording, or leave it out; return its numbers of steps and images."""
     excluded: dict[int, str] = {}
-    with EpisodeWriter.create(
-        folder, episode.header, now=now, created=episode.header.created
-    ) as writer:
-        for row in episode.rows:
-            try:
-                index = writer.add(row.step, row.jpeg)
-            except DemosError as error:
-                raise DemosError(f"{episode.name} cannot be imported: {error}") from error
-            pictures += row.jpeg is not None
-            for mark in row.marks:
-                writer.mark(mark)
-            if row.dropped is not None:
-                excluded[index] = row.dropped
-        if writer.is_full:
-            raise DemosError(
-                f"{episode.name} is longer than an episode may be, which is about an hour at 100 "
-                f"Hz: it has {writer.steps} steps. Split it."
-            )
-        writer.close(episode.outcome)
-    # Consecutive steps that were dropped for one reason become one line.
-    runs = groupby(enumerate(excluded.items()), key=lambda it: (it[1][1], it[1][0] - it[0]))
-    for (why, _), run in runs:
-        indexes = [index for _, (index, _) in run]
-        edit(writer.path, Drop(indexes[0], indexes[-1], why))
-    return writer.path, writer.steps, pictures
+    pictures, shown, created, writer = 0, None, episode.header.created, None
+    try:
+        with EpisodeWriter.create(folder, episode.header, now=now, created=created) as writer:
+            for record in episode.records:
+                index = writer.add(record.step, record.jpeg)
+                pictures += record.jpeg is not None and record.jpeg is not shown
+                shown = record.jpeg
+                for mark in record.marks:
+                    writer.mark(mark)
+                if record.dropped is not None:
+                    excluded[index] = record.dropped
+                if writer.is_full:
+                    raise DemosError("longer than an episode may be, about an hour at 100 Hz.")
+            writer.close(episode.outcome)
+    except DemosError as error:
+        if context.strict:
+            raise
+        text = str(error).removesuffix(".")
+        text = text if writer is None else text.replace(str(writer.path), "the episode")
+        context.report("left out", text, episode.name)
+    else:
+        # Consecutive steps that were dropped for one reason become one line.
+        runs = groupby(enumerate(excluded.items()), key=lambda it: (it[1][1], it[1][0] - it[0]))
+        for (why, _), run in runs:
+            indexes = [index for _, (index, _) in run]
+            edit(writer.path, Drop(indexes[0], indexes[-1], why))
+        if writer.steps:
+            return writer.steps, pictures
+    if writer is not None:
+        shutil.rmtree(writer.path)
+    return 0, 0

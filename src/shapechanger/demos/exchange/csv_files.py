@@ -22,22 +22,21 @@ from typing import Any, Final
 import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files, pictures
+from shapechanger.demos.exchange import files
 from shapechanger.demos.exchange.format import (
     COLUMNS,
     COMMANDS,
     ExchangeEpisode,
-    ExchangeStep,
     ExportContext,
     Format,
     ImportContext,
-    SourceRecord,
+    Record,
     as_json,
+    drives,
     features_of,
-    stretches,
     value_names,
 )
-from shapechanger.errors import DemosError, translate_errors
+from shapechanger.errors import DemosError
 
 _TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
@@ -45,7 +44,6 @@ _FRAMES: Final = "frames"
 _NAMES: Final = {field: names["csv"] for field, names in COLUMNS.items()}
 _VECTORS: Final = [field for field, name in _NAMES.items() if name.endswith("/")]
 _IN_JSON: Final = ("terms", "stop_reason", "marks", "dropped")
-_TEXTS: Final = ("frame", "driver", *_IN_JSON)
 _KNOWN_AS: Final = {
     **{key: (_NAMES["action"] + one.name, 1) for key, one in COMMANDS.items()},
     **dict.fromkeys(("file", "image", "picture", "filename"), ("frame", 1)),
@@ -54,6 +52,8 @@ _KNOWN_AS: Final = {
     "done": ("terminated", 1),
 }
 """Columns of `steps.csv`, each with its factor to their unit, by names in tables of others."""
+
+_Columns = Mapping[str, Sequence[str]]  # The names of the columns of each field of a step.
 
 
 def _tables_of(folder: Path) -> list[Path]:
@@ -67,7 +67,6 @@ def _tables_of(folder: Path) -> list[Path]:
 
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
-    """Return the names of the columns of each field of a step, in order."""
     actions, states = value_names(header.actions), value_names(header.states)
     values = dict.fromkeys(_VECTORS, actions) | {"state": states}
     return {
@@ -81,25 +80,26 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
     for number, episode in enumerate(episodes, 1):
         place = folder if len(episodes) == 1 else folder / f"episode-{number:04d}"
         (place / _FRAMES).mkdir(parents=True)
-        text = json.dumps(files.own_fields(episode), indent=1, ensure_ascii=False)
+        own = files.own_fields(episode.header, episode.outcome)
+        text = json.dumps(own, indent=1, ensure_ascii=False)
         (place / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
-        columns, frame = _columns(episode.header), ""
+        columns, frame, shown = _columns(episode.header), "", None
         with (place / _TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(chain.from_iterable(columns.values()))
-            for index, row in enumerate(episode.rows):
-                if row.jpeg is not None:
-                    frame = f"{index:06d}.jpg"
-                    (place / _FRAMES / frame).write_bytes(row.jpeg)
-                writer.writerow([index, frame, row.step.driver, *_cells(row, columns)])
+            for index, record in enumerate(episode.records):
+                if record.jpeg is not None and record.jpeg is not shown:
+                    frame, shown = f"{index:06d}.jpg", record.jpeg
+                    (place / _FRAMES / frame).write_bytes(shown)
+                writer.writerow([index, frame, record.step.driver, *_cells(record, columns)])
                 steps += 1
     return steps
 
 
-def _cells(row: ExchangeStep, columns: Mapping[str, Sequence[str]]) -> Iterator[str]:
+def _cells(record: Record, columns: _Columns) -> Iterator[str]:
     """Yield the cells of a step after those of its index, image and driver."""
     for field, names in list(columns.items())[3:]:
-        value: Any = getattr(row if field in {"marks", "dropped"} else row.step, field)
+        value: Any = getattr(record if field in {"marks", "dropped"} else record.step, field)
         if field in _VECTORS:
             yield from [""] * len(names) if value is None else map(repr, value)
         elif field == "terms":  # JSON has neither NaN nor infinity.
@@ -115,38 +115,38 @@ def _cells(row: ExchangeStep, columns: Mapping[str, Sequence[str]]) -> Iterator[
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     for place in _tables_of(folder):
+        path = place / _TABLE
+        (_, names), *lines = files.read_table(path) or [(1, [])]
+        names = [name.strip() for name in names]
         read = _own if (place / _HEADER).is_file() else _others
-        yield from read(place, context)
+        yield from read(path, names, lines, context)
 
 
-def _own(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+def _own(
+    path: Path, names: list[str], lines: list[tuple[int, list[str]]], context: ImportContext
+) -> Iterator[ExchangeEpisode]:
     if context.hz is not None:
         raise DemosError("The format csv states the rate itself: leave out --hz.")
-    path, where = folder / _HEADER, folder / _TABLE
-    header, outcome = files.own_header(files.read_json(path), path)
+    where, own = path.parent / _HEADER, files.read_json(path.parent / _HEADER)
+    ((header, outcome, _),) = files.own_episodes({"format": 1, "episodes": [own]}, where, 1)
     columns = _columns(header)
     expected = list(chain.from_iterable(columns.values()))
-    table = files.read_table(where, len(expected))
-    names = table[1][0][1] if table[1] else []
     if names != expected:
         wrong = ", ".join(sorted(set(names) ^ set(expected))[:5]) or "their order"
-        raise DemosError(f"{where} has other columns than {path}: {wrong}.")
-    records = _records(folder / _FRAMES, where, table, columns, None, context)
+        raise DemosError(f"{path} has other columns than {where}: {wrong}.")
+    records = _records(path.parent / _FRAMES, names, lines, columns, None)
     if header.image_size is None and any(record.frame for record in records):
-        raise DemosError(f"{where} has images, but {path} has no image_size.")
-    rows = pictures.rows_of(records, header.image_size, context, "line")
-    yield ExchangeEpisode(header=header, rows=rows, name=str(folder), outcome=outcome)
+        raise DemosError(f"{path} has images, but {where} has no image_size.")
+    yield ExchangeEpisode(header=header, records=records, name=str(path.parent), outcome=outcome)
 
 
-def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+def _others(
+    path: Path, stated: list[str], lines: list[tuple[int, list[str]]], context: ImportContext
+) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a table without a header."""
-    path = folder / _TABLE
-    table = files.read_table(path)
-    stated = [name.strip() for name in table[1][0][1]] if table[1] else []
-    known = [_KNOWN_AS.get(name.lower(), (name, 1)) for name in stated]
-    names = [name for name, _ in known]
+    known = dict(_KNOWN_AS.get(name.lower(), (name, 1)) for name in stated)
     columns = {
-        field: [n for n in names if (n.startswith(name) if field in _VECTORS else n == name)]
+        field: [n for n in known if (n.startswith(name) if field in _VECTORS else n == name)]
         for field, name in _NAMES.items()
     }
     if not columns["action"]:
@@ -154,67 +154,53 @@ def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
             f"There is no {_HEADER} next to {path}, and no column of an action: restore it, "
             f"or name columns action/NAME, or {', '.join(COMMANDS)}."
         )
-    if len(set(names)) < len(names):
+    if len(known) < len(stated):
         raise DemosError(f"{path} has two columns of one name: rename one of them.")
-    if others := set(names).difference(*columns.values()):
-        context.note(f"Columns that are not imported: {', '.join(sorted(others))}.")
-    table[1][0] = (1, names)
-    found = _records(folder, path, table, columns, dict(known), context)
-    records, size = pictures.with_pictures(found, "line", context)
+    if others := known.keys() - set(chain.from_iterable(columns.values())):
+        context.report("note", f"Columns that are not imported: {', '.join(sorted(others))}.")
     layouts: list[str] = []
     for field in ("action", "state"):
         values = [name.removeprefix(_NAMES[field]) for name in columns[field]]
-        features = [COMMANDS.get(name) or features_of(name, 1)[0] for name in values]
-        layouts.append(as_json(features))
-    for part, hz, timed in stretches([records] if records else [], "line", context):
-        header = EpisodeHeader(
-            action_layout=layouts[0],
-            state_layout=layouts[1],
-            image_size=size,
-            control_hz=hz,
-            clock="real" if timed else "none",
-            source="csv",
-        )
-        rows = pictures.rows_of(part, size, context, "line")
-        yield ExchangeEpisode(header=header, rows=rows, name=f"{folder}, from {part[0].name}")
+        layouts.append(as_json([COMMANDS.get(name) or features_of(name, 1)[0] for name in values]))
+    header = EpisodeHeader(action_layout=layouts[0], state_layout=layouts[1], source="csv")
+    records = _records(path.parent, list(known), lines, columns, known)
+    for part, head in drives([records], header, context):
+        name = f"{path.parent}, from {part[0].name}"
+        yield ExchangeEpisode(header=head, records=part, name=name)
 
 
 def _records(
     folder: Path,
-    path: Path,
-    table: tuple[str, list[tuple[int, list[str]]]],
-    columns: Mapping[str, Sequence[str]],
+    names: Sequence[str],
+    lines: Sequence[tuple[int, list[str]]],
+    columns: _Columns,
     factors: Mapping[str, int] | None,
-    context: ImportContext,
-) -> list[SourceRecord]:
-    """Return the lines of a table that can be read, with their images; the others are left out.
+) -> list[Record]:
+    """Return the lines of a table with their images.
 
     An own table has no `factors` of columns, and the tables of others may lack columns.
     """
-    separator, ((_, names), *lines) = table
-    records: list[SourceRecord] = []
-    shown, known = "", set[str]()
+    records: list[Record] = []
+    shown, known, last = "", set[str](), -1
     for position, (line, cells) in enumerate(lines):
+        record = Record(step=Step(action=(), driver="person"), number=position)
+        record.name = f"line {line} of {folder.parent.name if factors is None else folder.name}"
+        records.append(record)
         try:
             if len(cells) != len(names):
-                hint = " (decimal commas need another separator)" if separator == "," else ""
-                raise ValueError(f"{len(cells)} cells instead of {len(names)}{hint}")
-            found = dict(zip(names, cells, strict=True))
-            record = _record(found, columns, factors, comma=separator != ",")
-            if factors is not None:
-                record.number = position
-            elif record.number <= (records[-1].number if records else -1):
-                raise ValueError(f"step {record.number} is not after the step before")
-        except (ValueError, RecursionError, msgspec.ValidationError) as error:
-            context.leave_out("line", f"of {path}", f"line {line}: {error}")
+                raise ValueError(f"{len(cells)} cells instead of {len(names)}")
+            frame = _fill(record, dict(zip(names, cells, strict=True)), columns, factors)
+            if factors is None and record.step.index <= last:
+                raise ValueError(f"step {record.step.index} is not after the step before")
+            last = record.step.index
+        except (ValueError, ArithmeticError, RecursionError, msgspec.ValidationError) as error:
+            record.fault = str(error)
             continue
-        record.name, frame = f"line {line}", str(record.frame)
-        records.append(record)
-        record.picture = folder / frame if frame else None
+        record.frame, record.image = frame, folder / frame if frame else None
         if frame and not files.is_inside(folder, frame):
-            record.fault = "with an image name that leaves the folder"
+            record.fault = "an image name that leaves the folder"
         elif frame != shown and frame in known:
-            record.fault = f"that returns to the image {frame!r} of an earlier step"
+            record.fault = f"it returns to the image {frame!r} of an earlier step"
         elif not frame and shown:
             record.fault = "without an image"
         else:
@@ -223,18 +209,13 @@ def _records(
     return records
 
 
-def _record(
-    cells: Mapping[str, str],
-    columns: Mapping[str, Sequence[str]],
-    factors: Mapping[str, int] | None,
-    *,
-    comma: bool,
-) -> SourceRecord:
+def _fill(
+    record: Record, cells: Mapping[str, str], columns: _Columns, factors: Mapping[str, int] | None
+) -> str:
+    """Fill a record from the cells of a line, and return the name of its image."""
     fields: dict[str, Any] = {} if factors is None else {"driver": "person"}
     for field, names in columns.items():
         values = [cell for name in names if (cell := cells[name].strip())]
-        if comma and field not in _TEXTS:
-            values = [value.replace(",", ".") for value in values]
         factor = (factors or {}).get(names[0], 1) if names else 1
         if field in _VECTORS:
             fields |= {field: values} if values else {}
@@ -244,9 +225,10 @@ def _record(
         elif field in _IN_JSON:
             fields[field] = json.loads(values[0])
         elif factor > 1:
-            wrong = f"{names[0]} is not a time: {values[0]!r}"
-            with translate_errors(ArithmeticError, to=lambda _, wrong=wrong: ValueError(wrong)):
+            try:
                 fields[field] = int((Decimal(values[0]) * factor).quantize(1))
+            except ArithmeticError as error:
+                raise ValueError(f"{names[0]} is not a time: {values[0]!r}") from error
         else:
             fields[field] = values[0]
     sizes = [len(columns[field]) for field in ("action", "state")]
@@ -255,14 +237,10 @@ def _record(
     step = Step.from_json(fields)
     if reason := step.refusal(*sizes):
         raise ValueError(reason)
-    return SourceRecord(
-        name="",
-        step=step,
-        number=step.index,
-        frame=frame or "",
-        marks=msgspec.convert(marks or (), tuple[str, ...]),
-        dropped=msgspec.convert(dropped, str | None),
-    )
+    record.marks = msgspec.convert(marks or (), tuple[str, ...])
+    record.dropped = msgspec.convert(dropped, str | None)
+    record.step = step
+    return frame or ""
 
 
 FORMAT: Final = Format(

@@ -1,4 +1,4 @@
-"""Read and write files of datasets: sources stay unchanged, targets are complete or absent.
+"""Read files and images of datasets, and make new folders, which are complete or absent.
 
 Reads are limited to `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of an image,
 `MAX_UNPACKED` of compressed data, and regular files inside the folder. All functions raise
@@ -11,7 +11,6 @@ import csv
 import io
 import json
 import os
-import re
 import secrets
 import shutil
 from collections.abc import Generator
@@ -21,10 +20,12 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader
-from shapechanger.demos.episodes.records import MAX_TEXT_BYTES
-from shapechanger.demos.exchange.format import ExchangeEpisode
+from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES, MAX_TEXT_BYTES
+from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
 from shapechanger.errors import (
     DemosError,
     LayoutError,
@@ -40,7 +41,10 @@ MAX_UNPACKED: Final = 64 << 20
 MAX_VALUES: Final = 1 << 17
 """Largest number of values of a feature."""
 
-_SEPARATOR_LINE: Final = re.compile(r"sep=([,;\t])")  # First line that Excel may write.
+_JPEG: Final = b"\xff\xd8"
+_PNG: Final = b"\x89PNG"
+_PNG_DEPTH: Final = slice(24, 25)  # Position of the number of bits of a value.
+_OPAQUE: Final = 255
 
 
 def library(name: str, extra: str = "data") -> Any:
@@ -124,20 +128,72 @@ def read_text(path: Path) -> str:
         ) from error
 
 
-def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[str]]]]:
-    """Read a CSV file, also from spreadsheets with semicolons or tabs, and with blank lines."""
+def read_table(path: Path) -> list[tuple[int, list[str]]]:
+    """Read a CSV file with commas or semicolons; return its lines that are not blank."""
     text = read_text(path)
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    stated = _SEPARATOR_LINE.fullmatch(first.strip())
-    found = [mark for mark in ",\t;" if first.count(mark) >= max(1, columns - 1)]
-    # A file with decimal commas is separated by semicolons, so the last mark that fits is used.
-    separator = stated[1] if stated else found[-1] if found else ","
+    first = text.lstrip().split("\n", 1)[0]
+    separator = ";" if first.count(";") > first.count(",") else ","
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
     try:
-        lines = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+        return [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
     except csv.Error as error:
         raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
-    return separator, lines[1:] if stated else lines
+
+
+def load_jpeg(
+    image: Path | bytes | NDArray[np.uint8], decoded: tuple[int, int] | None = None
+) -> tuple[bytes, tuple[int, int]]:
+    """Return an intact image as JPEG of its pixels or as it is, with its width and height.
+
+    Other images than JPEGs are encoded with quality 100.
+
+    Args:
+        image: A file, or the content of one: JPEG, PNG or BMP; or pixels, shape
+            (height, width, 3).
+        decoded: Its size if it was decoded before, so that a JPEG is not decoded again.
+
+    Raises:
+        DemosError: If it is missing, damaged, of another kind, or too large; a noun with a reason.
+    """
+    if isinstance(image, np.ndarray):
+        return encode_picture(image), (image.shape[1], image.shape[0])
+    with translate_errors(
+        OSError, to=lambda error: DemosError(f"an image that cannot be read ({error.strerror})")
+    ):
+        data = read_file(image, MAX_PICTURE_BYTES) if isinstance(image, Path) else image
+    if not data.strip(b"\0"):
+        raise DemosError("an empty image")
+    if len(data) > MAX_PICTURE_BYTES:
+        raise DemosError(f"an image of more than {MAX_PICTURE_BYTES} bytes")
+    is_jpeg = data.startswith(_JPEG)
+    if is_jpeg and decoded:
+        return data, decoded
+    if not is_jpeg and not data.startswith((_PNG, b"BM")):
+        raise DemosError("an image that is not JPEG, PNG or BMP")
+    if data.startswith(_PNG) and data[_PNG_DEPTH] == b"\x10":
+        raise DemosError("an image of more than 8 bits a value, like that of a depth camera")
+    try:
+        pixels = decode_picture(data, "") if is_jpeg else _pixels(data)
+    except MissingExtra:
+        raise
+    except Exception as error:  # Pillow's errors have no common base.
+        raise DemosError("a damaged image") from error
+    if pixels is None:
+        raise DemosError(
+            f"an image that is partly transparent, or of more than {MAX_PIXELS} pixels"
+        )
+    return data if is_jpeg else encode_picture(pixels), (pixels.shape[1], pixels.shape[0])
+
+
+def _pixels(data: bytes) -> NDArray[np.uint8] | None:
+    """Decode a PNG or BMP of 8 bits, shape (height, width, 3); None if it is refused."""
+    with library("PIL.Image").open(io.BytesIO(data), formats=["PNG", "BMP"]) as opened:
+        if opened.width * opened.height > MAX_PIXELS:
+            return None
+        alpha = opened.convert("RGBA") if opened.has_transparency_data else None
+        if alpha is not None and np.asarray(alpha)[..., 3].min() < _OPAQUE:
+            return None
+        return np.asarray(opened.convert("RGB"))
 
 
 class _OwnEpisodes(msgspec.Struct):
@@ -169,26 +225,32 @@ def read_json(path: Path, kind: Any = dict[str, Any]) -> Any:
     return parse_json(read_text(path), path, kind)
 
 
-def own_fields(episode: ExchangeEpisode) -> dict[str, Any]:
-    """Return the fields of an exported episode that `own_header` reads."""
-    return episode.header.to_json() | {"outcome": episode.outcome}
+def own_fields(header: EpisodeHeader, outcome: str) -> dict[str, Any]:
+    """Return the fields of an exported episode that `own_episodes` reads."""
+    return header.to_json() | {"outcome": outcome}
 
 
-def own_header(fields: dict[str, Any], where: object) -> tuple[EpisodeHeader, str]:
-    """Return the header and the outcome of an episode that Shapechanger exported."""
-    with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
-        return EpisodeHeader.from_json(fields), str(fields.get("outcome", ""))
+def own_episodes(
+    section: Any, where: object, count: int
+) -> list[tuple[EpisodeHeader, str, dict[str, Any]]]:
+    """Return the header, outcome and all fields of each episode that Shapechanger exported.
 
-
-def own_episodes(section: Any, where: object, count: int) -> list[dict[str, Any]]:
-    """Return the `own_fields` of the `count` episodes of a dataset that Shapechanger exported."""
+    Args:
+        section: Our own section of a dataset.
+        where: How to name it in errors.
+        count: Number of episodes in the dataset.
+    """
     own: _OwnEpisodes = converted(section, _OwnEpisodes, where)
     if len(own.episodes) != count:
         raise DemosError(
             f"{where} describes {len(own.episodes)} episodes, and the dataset has {count}: remove "
             "it if the dataset was edited."
         )
-    return own.episodes
+    with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
+        return [
+            (EpisodeHeader.from_json(fields), str(fields.get("outcome", "")), fields)
+            for fields in own.episodes
+        ]
 
 
 def cannot_read(path: Path, error: OSError) -> DemosError:

@@ -1,28 +1,30 @@
-"""Formats of datasets: their declaration, the names of their columns, and steps on their way.
+"""Formats of datasets: their declaration, the names of their columns, and records on their way.
 
-A reader fills `SourceRecord`s from its file; `pictures.rows_of` makes steps of them. Where the rate
-is not stated, it is measured, and sessions are split where time jumps. Times may be rounded, and
-records may be missing, so a median of periods is not the rate: at times in whole milliseconds it is
-off by up to 2 % at 20 Hz. The rate is the mean over the periods near the median, each divided by
-the steps that its records are apart where they are numbered.
+A reader yields `ExchangeEpisode`s of `Record`s; `whole_records` leaves out what is not whole. If
+the rate is not stated, `drives` measures it, and splits sessions where time jumps. Times may be
+rounded, and records may be missing, so a median of periods is not the rate: at times in whole
+milliseconds it is off by up to 2 % at 20 Hz. The rate is the mean over the periods near the median,
+each divided by the steps that its records are apart if they are numbered.
 """
 
 from __future__ import annotations
 
 import statistics
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from msgspec.structs import replace
+from msgspec import structs
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import EpisodeHeader, Step
+from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.episodes.records import longest_period_s
+from shapechanger.demos.exchange.files import load_jpeg
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Feature, Layout
@@ -61,9 +63,7 @@ COMMANDS: Final = {
 }
 """Values of an action by their names in tables of others; a key that is held is 1."""
 
-
 _MAX_FEATURES: Final = 512  # That values become one by one; more become one array feature.
-_UNIT_UNKNOWN: Final = "?"
 _NS_PER_S: Final = 1e9
 _PAUSE_PERIODS: Final = 30.0
 _NEAR: Final = (0.5, 1.5)  # Of the median period; one missing record is 2.
@@ -79,46 +79,33 @@ DEFAULT_HZ: Final = 20.0
 """Steps per second of an episode without any information on its rate, Hz."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExchangeStep:
-    """One step between two formats.
+@dataclass(slots=True, kw_only=True)
+class Record:
+    """A step between two formats.
 
     Attributes:
         step: The step; its index and the name of its frame are ignored.
-        jpeg: Its image; None for that of the step before, or without a camera.
+        jpeg: Its image; the same object if it is the image of the record before. An import sets it.
         marks: Texts of its marks.
         dropped: Why the step is excluded; None if it is not.
-    """
-
-    step: Step
-    jpeg: bytes | None
-    marks: tuple[str, ...] = ()
-    dropped: str | None = None
-
-
-@dataclass(slots=True, kw_only=True)
-class SourceRecord:
-    """A record of a source, before it is checked.
-
-    Attributes:
         name: Its name in reports.
-        step: Its step, with its time as `captured_ns`.
         number: Its number in the source; gaps are missing records.
-        picture: Its image: a file, a JPEG, PNG or BMP, or pixels; None without one.
-        frame: Equal for successive records that share an image; None to take `picture`.
-        fault: Why it cannot be imported, after a noun; "" if it can.
-        marks: Texts of its marks.
-        dropped: Why the step is excluded; None if it is not.
+        image: Its image in the source: a file, a JPEG, PNG or BMP, or pixels; None without one.
+        frame: Equal for successive records that share an image; None to compare `image`.
+        size: Width and height of its image, if it was decoded before.
+        fault: Why it cannot be imported; "" if it can.
     """
 
-    name: str
     step: Step
-    number: int = 0
-    picture: Path | bytes | NDArray[np.uint8] | None = None
-    frame: object = None
-    fault: str = ""
+    jpeg: bytes | None = None
     marks: tuple[str, ...] = ()
     dropped: str | None = None
+    name: str = ""
+    number: int = 0
+    image: Path | bytes | NDArray[np.uint8] | None = None
+    frame: object = None
+    size: tuple[int, int] | None = None
+    fault: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,72 +114,71 @@ class ExchangeEpisode:
 
     Attributes:
         header: Its metadata.
-        rows: Its steps in order; they can be iterated once, at any time.
+        records: Its steps in order; they can be iterated once, at any time. A DemosError meanwhile
+            leaves the episode out.
         name: How to name the episode in errors.
         outcome: How it ended; "" if unspecified.
     """
 
     header: EpisodeHeader
-    rows: Iterable[ExchangeStep]
+    records: Iterable[Record]
     name: str
     outcome: str = ""
+
+
+Kind = Literal["note", "warning", "left out"]
+"""Kinds of findings: something harmless, a contradiction in the source, and a part left out."""
+
+
+class Finding(NamedTuple):
+    """A finding of an import or an export, as a sentence or as names and a reason."""
+
+    kind: Kind
+    text: str
 
 
 @dataclass(slots=True, kw_only=True)
 class ImportContext:
     """Options of an import, and its findings so far.
 
-    A reader yields what is whole. It calls `leave_out` for each part that it skips, `warn` where a
-    source contradicts itself or is implausible, and `note` for what is neither lost nor wrong. With
-    `strict`, the import is refused at the end if there is anything of the first two kinds.
-
     Attributes:
         camera: Name of the camera to take, if there are several; "" for the only one.
         hz: Steps per second, as stated by the user; None to read or measure them.
         strict: Whether to refuse a source that is incomplete or contradicts itself.
-        left_out: Names of the parts that are left out, by what they are and by the reason.
-        warnings: Contradictions, as sentences that state their size.
-        notes: Further facts, as sentences.
     """
 
     camera: str = ""
     hz: float | None = None
     strict: bool = False
-    left_out: dict[tuple[str, str], list[str]] = field(
-        default_factory=dict[tuple[str, str], list[str]]
+    _found: dict[tuple[Kind, str], list[str]] = field(
+        default_factory=dict[tuple[Kind, str], list[str]]
     )
-    warnings: list[str] = field(default_factory=list[str])
-    notes: list[str] = field(default_factory=list[str])
 
-    def leave_out(self, what: str, reason: str, name: object) -> None:
-        """Report that a part is left out."""
-        self.left_out.setdefault((what, reason), []).append(str(name))
+    def report(self, kind: Kind, text: str, name: str = "") -> None:
+        """Add a finding; parts of one finding are listed together.
 
-    def warn(self, sentence: str) -> None:
-        """Report a contradiction in the source, once."""
-        self.warnings += [sentence] if sentence not in self.warnings else []
+        Args:
+            kind: Its kind.
+            text: A sentence, or the reason if parts are named.
+            name: The part that it is about.
 
-    def note(self, sentence: str) -> None:
-        """Report a fact that is neither a loss nor a contradiction, once."""
-        self.notes += [sentence] if sentence not in self.notes else []
-
-    def left_out_lines(self) -> list[str]:
-        """Return a line for each reason, such as "9 records with an empty image: 31, 32, ...".
-
-        The reason with most parts is first.
+        Raises:
+            DemosError: If `strict`, unless it is a note.
         """
-        groups = sorted(self.left_out.items(), key=lambda group: -len(group[1]))
-        return [f"{counted(len(n), what)} {reason}: {few(n)}" for (what, reason), n in groups]
-
-    def require_whole(self, source: object) -> None:
-        """Refuse a source of which something is left out, or which contradicts itself."""
-        findings = [f"left out: {line}" for line in self.left_out_lines()]
-        findings += [warning.removesuffix(".") for warning in self.warnings]
-        if findings:
+        names = self._found.setdefault((kind, text), [])
+        names += [name] if name else []
+        if self.strict and kind != "note":
+            found = f"{name}: {text}" if name else text
             raise DemosError(
-                f"{source} is incomplete ({'; '.join(findings)}): repair it, or import it with "
-                "`shapechanger demos import` and without --strict."
+                f"The source is incomplete ({found.removesuffix('.')}): repair it, or import it "
+                "with `shapechanger demos import` and without --strict, which lists all findings."
             )
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings, such as "record 12, record 15, and 2 more: an empty image"."""
+        found = self._found.items()
+        return tuple(Finding(k, f"{few(n)}: {text}" if n else text) for (k, text), n in found)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,11 +207,13 @@ class Format:
         title: Its name in sentences.
         sign: Files by which a folder of the format is known, such as "steps.csv".
         detect: Returns whether a folder has the format; None if it cannot be imported.
-        read: Yields the episodes of a folder, and tells the context what it leaves out.
+        read: Yields the episodes of a folder, and reports findings to the context.
         write: Writes episodes into an existing folder and returns the number of steps; None if the
             format cannot be exported.
         options: Options that it takes: "camera" and "hz" on import; "task", "images" and "dropped"
             (excluded steps, marked as such) on export.
+        alike: What all episodes of a dataset have in common: "actions", "states", "image_size" and
+            "control_hz" of their headers.
         consecutive: Whether each step follows the one before, so that an export splits episodes.
         timed: Whether it keeps the times of steps.
     """
@@ -237,13 +225,9 @@ class Format:
     read: Callable[[Path, ImportContext], Iterator[ExchangeEpisode]] | None = None
     write: Callable[[Sequence[ExchangeEpisode], Path, ExportContext], int] | None = None
     options: frozenset[str] = frozenset()
+    alike: tuple[str, ...] = ()
     consecutive: bool = False
     timed: bool = True
-
-
-def counted(number: int, what: str) -> str:
-    """Format a count, such as "1 record" or "2 records"."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def few(names: Sequence[object]) -> str:
@@ -252,44 +236,62 @@ def few(names: Sequence[object]) -> str:
     return f"{shown}, and {len(names) - 3} more" if len(names) > 3 else shown
 
 
-def kept_steps(rows: Iterable[ExchangeStep]) -> Iterator[tuple[Step, bytes | None]]:
-    """Yield the steps that are not excluded, each with its image, even where it is shared."""
-    picture: bytes | None = None
-    for row in rows:
-        picture = picture if row.jpeg is None else row.jpeg
-        if row.dropped is None:
-            yield row.step, picture
+def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[Record]:
+    """Yield the records of an episode that are whole, with images as JPEG; report the others."""
+    size = episode.header.image_size
+    shown, jpeg = None, None
+    for record in episode.records:
+        frame = record.image if record.frame is None else record.frame
+        step, fault = record.step, record.fault
+        if not fault and not all(map(isfinite, step.action)):
+            fault = "its action is not finite"
+        if not fault and step.driver not in DRIVERS:
+            fault = str(UnknownName("driver", step.driver, DRIVERS)).removesuffix(".")
+        if not fault and size is not None and record.image is not None and frame != shown:
+            try:
+                new, found = load_jpeg(record.image, record.size)
+                fault = _size_fault(found, size)
+                shown, jpeg = (shown, jpeg) if fault else (frame, new)
+            except DemosError as error:
+                fault = str(error)
+        if fault:
+            context.report("left out", fault, record.name)
+        else:
+            record.jpeg = jpeg
+            yield record
 
 
-def decoded_steps(
-    rows: Iterable[ExchangeStep], size: tuple[int, int] | None, name: str, title: str
-) -> Iterator[tuple[ExchangeStep, bytes, NDArray[np.uint8] | None]]:
-    """Yield steps for a dataset with an image at every step, each with its image.
+def _size_fault(found: tuple[int, int], size: tuple[int, int]) -> str:
+    shown = "an image of {} x {} pixels, and not {} x {}".format(*found, *size)
+    return "" if found == size else shown
+
+
+def decoded_images(
+    episode: ExchangeEpisode, title: str
+) -> Iterator[tuple[Record, NDArray[np.uint8] | None]]:
+    """Yield the records for a dataset with an image of one size at every step.
 
     Args:
-        rows: The steps.
-        size: Width and height of all images; None without images.
-        name: How to name the episode in errors.
+        episode: The episode.
         title: How to name the format in errors.
 
     Yields:
-        The step; its image, also if it is shared; and its pixels if it is new, shape
-        (height, width, 3).
+        The record, and the pixels of its image if it is new, shape (height, width, 3).
     """
-    jpeg = b""
-    for number, row in enumerate(rows):
-        pixels, where = None, f"of step {number} of {name}"
-        if size is not None and row.jpeg is not None:
-            jpeg, pixels = row.jpeg, decode_picture(row.jpeg, where)
-            height, width, _ = pixels.shape
-            if (width, height) != size:
-                raise DemosError(
-                    f"The image {where} has {width} x {height} pixels, and not {size[0]} x "
-                    f"{size[1]}: a {title} dataset has one size."
-                )
-        if size is not None and not jpeg:
-            raise DemosError(f"There is no image {where}, but {title} needs one at every step.")
-        yield row, jpeg, pixels
+    size = episode.header.image_size
+    shown = None
+    for number, record in enumerate(episode.records):
+        pixels, where = None, f"of step {number} of {episode.name}"
+        if (size is None) != (record.jpeg is None):
+            found = "an image" if size is None else "no image"
+            raise DemosError(
+                f"There is {found} {where}: {title} needs images at all steps or none."
+            )
+        if size is not None and record.jpeg is not None and record.jpeg is not shown:
+            shown, pixels = record.jpeg, decode_picture(record.jpeg, where)
+            if fault := _size_fault((pixels.shape[1], pixels.shape[0]), size):
+                raise DemosError(f"{title} needs images of one size: step {where} has {fault}.")
+        yield record, pixels
 
 
 def value_names(layout: Iterable[Feature]) -> list[str]:
@@ -301,107 +303,119 @@ def value_names(layout: Iterable[Feature]) -> list[str]:
     ]
 
 
-def stretches(
-    parts: Sequence[list[SourceRecord]],
-    what: str,
+def drives(
+    sessions: Sequence[list[Record]],
+    header: EpisodeHeader,
     context: ImportContext,
     stated_hz: float | None = None,
-) -> list[tuple[list[SourceRecord], float, bool]]:
-    """Measure the rates of sessions, or take a stated one, and split them where time jumps.
+) -> Iterator[tuple[list[Record], EpisodeHeader]]:
+    """Yield the drives of a source that does not state its rate or the size of its images.
 
-    What is odd about the times is reported. Times that contradict the stated rate are left out.
+    Records without a whole image of the most frequent size are left out, so that rates and pauses
+    follow from those that remain. Times that contradict a stated rate are left out, too.
 
-    Returns:
-        Records that follow each other without a pause, with their rate in Hz and whether their
-        times are known and believed.
+    Args:
+        sessions: Records with their time as `captured_ns`, from one start of the robot to the next.
+        header: Metadata of all drives.
+        context: Collects the findings.
+        stated_hz: Steps per second according to the source, if it does state them.
+
+    Yields:
+        Records that follow each other without a pause, and their header with the rate and the size
+        of images; its clock is "none" if times are unknown.
     """
-    periods_ns: list[list[float]] = []  # From one record to the next, per number that they differ.
-    for part in parts:
+    for record in chain(*sessions):
+        if record.image is not None and not record.fault:
+            try:
+                _, record.size = load_jpeg(record.image)
+            except DemosError as error:
+                record.fault = str(error)
+    sizes = Counter(record.size for record in chain(*sessions) if record.size)
+    common = max(sizes, key=sizes.__getitem__, default=None)
+    parts: list[list[Record]] = []
+    for session in sessions:
+        for record in session:
+            if record.size and common and not record.fault:
+                record.fault = _size_fault(record.size, common)
+            if record.fault:
+                context.report("left out", record.fault, record.name)
+        part = [record for record in session if not record.fault]
         missing = sum(record.step.captured_ns is None for record in part)
         if 0 < missing < len(part):
-            context.warn(
-                f"{missing} of the {len(part)} {what}s from {part[0].name} have no valid time: the "
-                "times of the others are left out."
+            context.report(
+                "warning",
+                "some records lack a time: the times of its session are left out",
+                part[0].name,
             )
             _leave_out_times(part)
-        pairs = pairwise(() if missing else part)
-        periods_ns.append([_passed_ns(a, b) / max(1, b.number - a.number) for a, b in pairs])
-    rates = _rates(periods_ns, context, stated_hz)
-    if rates is None:
-        rates = [context.hz or stated_hz or DEFAULT_HZ] * len(parts)
-        for part in parts:
-            _leave_out_times(part)
-    found: list[tuple[list[SourceRecord], float, bool]] = []
-    pauses_s: list[float] = []
-    backwards: list[tuple[float, str]] = []
-    for part, hz in zip(parts, rates, strict=True):
-        starts, is_timed = [0], part[0].step.captured_ns is not None
-        for number, (now, later) in enumerate(pairwise(part if is_timed else ()), 1):
+        parts += [part] if part else []
+    header = replace(header, image_size=common)
+    for part, hz in zip(parts, _rates(parts, context, stated_hz), strict=True):
+        timed, starts = part[0].step.captured_ns is not None, [0]
+        for number, (now, later) in enumerate(pairwise(part), 1):
             passed_s = _passed_ns(now, later) / _NS_PER_S
-            if 0.0 <= passed_s <= longest_period_s(hz):
-                continue
-            starts.append(number)
             if passed_s < 0.0:
-                backwards.append((-passed_s, later.name))
-            else:
-                pauses_s.append(passed_s)
-        found += [(part[one:two], hz, is_timed) for one, two in pairwise([*starts, len(part)])]
-    if pauses_s:
-        context.note(
-            f"A new episode begins after {counted(len(pauses_s), 'pause')}, of "
-            f"{max(pauses_s):.6g} s at most and {sum(pauses_s):.6g} s in all."
-        )
-    if backwards:
-        context.warn(
-            f"Time runs backwards by up to {max(backwards)[0]:.6g} s at "
-            f"{few([name for _, name in backwards])}: a new episode begins there."
-        )
-    return found
+                context.report("warning", "time runs backwards: an episode begins", later.name)
+            elif passed_s > longest_period_s(hz):
+                context.report("note", "an episode begins after a pause", later.name)
+            if not 0.0 <= passed_s <= longest_period_s(hz):
+                starts.append(number)
+        head = replace(header, control_hz=hz, clock="real" if timed else "none")
+        for one, two in pairwise([*starts, len(part)]):
+            yield part[one:two], head
 
 
-def _passed_ns(one: SourceRecord, two: SourceRecord) -> int:
+def _passed_ns(one: Record, two: Record) -> int:
     return (two.step.captured_ns or 0) - (one.step.captured_ns or 0)
 
 
-def _leave_out_times(part: Iterable[SourceRecord]) -> None:
+def _leave_out_times(part: Iterable[Record]) -> None:
     for record in part:
-        record.step = replace(record.step, captured_ns=None)
+        record.step = structs.replace(record.step, captured_ns=None)
 
 
 def _rates(
-    periods_ns: Sequence[Sequence[float]], context: ImportContext, stated_hz: float | None
-) -> list[float] | None:
-    """Return the rate of each session; None if the times contradict the one that is stated."""
+    parts: Sequence[list[Record]], context: ImportContext, stated_hz: float | None
+) -> list[float]:
+    """Return the rate of each session; times that contradict the stated one are left out."""
+    periods_ns = [
+        [_passed_ns(a, b) / max(1, b.number - a.number) for a, b in pairwise(part)]
+        for part in parts
+        if part[0].step.captured_ns is not None
+    ]
     measured = measured_hz([*chain.from_iterable(periods_ns)])
     about = f"{1e3 / (measured or inf):.4g} ms apart, {measured or 0.0:.4g} a second"
     if (hz := context.hz or stated_hz) is not None:
-        if measured is None or 1.0 / _RATE_RATIO < measured / hz < _RATE_RATIO:
-            return [hz] * len(periods_ns)
-        (context.warn if context.hz is None else context.note)(
-            f"The records are {about} by their times, and not the {hz:g} Hz that are stated: "
-            "these times are left out."
-        )
-        return None
+        if measured and not 1.0 / _RATE_RATIO < measured / hz < _RATE_RATIO:
+            _leave_out_times(chain(*parts))
+            context.report(
+                "warning" if context.hz is None else "note",
+                f"The records are {about} by their times, and not the {hz:g} Hz that are stated: "
+                "these times are left out.",
+            )
+        return [hz] * len(parts)
     if measured is None:
-        context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
-        return [DEFAULT_HZ] * len(periods_ns)
+        context.report(
+            "note", f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it."
+        )
+        return [DEFAULT_HZ] * len(parts)
     each = [(len(part) >= _MIN_PERIODS and measured_hz(part)) or measured for part in periods_ns]
     differ = max(each) > _RATE_RATIO * min(each)
     rates = [_nominal_hz(hz if differ else measured) for hz in each]
     if differ:
-        context.warn(
+        context.report(
+            "warning",
             f"The drives have from {min(each):.3g} to {max(each):.3g} steps a second: a policy "
-            "learns from one rate at a time."
+            "learns from one rate at a time.",
         )
     elif abs(measured / rates[0] - 1.0) > _WHOLE[0][1]:
-        context.note(
-            f"The records are {about}, which is taken to be {rates[0]:g} Hz; --hz states another "
-            "rate."
-        )
+        text = f"The records are {about}, which is taken to be {rates[0]:g} Hz; --hz states another"
+        context.report("note", f"{text} rate.")
     if not all(_SLOWEST_HZ <= hz <= _FASTEST_HZ for hz in rates):
-        context.warn(
+        context.report(
+            "warning",
             f"The records are {about}, but robots have {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz: "
-            "perhaps a conversion set their times. State the rate with --hz."
+            "perhaps a conversion set their times. State the rate with --hz.",
         )
     return rates
 
@@ -443,12 +457,15 @@ def features_of(
     low: Sequence[float] = (),
     high: Sequence[float] = (),
 ) -> list[Feature]:
-    """Return the features of the values of a column of others: named, numbered, or one array."""
-    units = units if len(units) == size and all(units) else (_UNIT_UNKNOWN,) * size
+    """Return the features of the values of a column of others: named, numbered, or one array.
+
+    Without a unit for each value, the unit is unknown: "?".
+    """
+    units = units if len(units) == size and all(units) else ("?",) * size
     lows = low or (-inf,) * size
     highs = high or (inf,) * size
     if not names and size > _MAX_FEATURES:
-        unit = units[0] if len(set(units)) == 1 else _UNIT_UNKNOWN
+        unit = units[0] if len(set(units)) == 1 else "?"
         return [Feature(key, unit, min(lows), max(highs), shape=(size,))]
     names = names or ([f"{key}/{n}" for n in range(size)] if size > 1 else [key])
     return [Feature(*about) for about in zip(names, units, lows, highs, strict=True)]

@@ -33,13 +33,13 @@ from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
     Format,
     ImportContext,
-    SourceRecord,
+    Record,
     as_json,
     choose_camera,
     features_of,
 )
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, write
-from shapechanger.demos.exchange.pictures import VideoTimes, read_pictures, read_times, rows_of
+from shapechanger.demos.exchange.video import VideoTimes, read_pictures, read_times
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
@@ -152,7 +152,7 @@ class _Dataset:
         self._most_bytes = files.MAX_UNPACKED  # Of images in the tables, which can share one.
         self._groups: dict[Path, dict[float, set[int]]] = {}
         self._filmed: dict[str, list[_Entry]] = defaultdict(list)
-        self._videos: dict[str, VideoTimes | str] = {}
+        self._videos: dict[str, VideoTimes | DemosError] = {}
         for entry in self._entries.values():
             self._filmed[self._video_name(entry)].append(entry)
 
@@ -168,26 +168,21 @@ class _Dataset:
             source="lerobot",
             notes=notes | ({"camera": self._camera.key} if self._camera else {}),
         )
-        own, ours = self._folder / OURS, list[Any]()
-        if own.is_file():
-            ours = files.own_episodes(files.read_json(own), own, max(self._entries) + 1)
+        path = self._folder / OURS
+        count, is_ours = max(self._entries) + 1, path.is_file()
+        own = files.own_episodes(files.read_json(path), path, count) if is_ours else []
         for number, entry in self._entries.items():
-            drivers, outcome = list[Driver](), ""
             task = {"task": ", ".join(entry.tasks)} if entry.tasks else {}
-            about = replace(header, notes=header.notes | task)
-            if ours:
-                about, outcome, drivers = _own(ours[number], about, f"{own}, episode {number}")
-            pictures = self._pictures(entry) if self._video else repeat(None, entry.length)
-            if isinstance(pictures, str):
-                self._context.leave_out("episode", pictures, number)
-                continue
-            records = self._records(entry, pictures, drivers)
-            rest = [f"{frame} of episode {number}" for frame in range(entry.length)]
-            rows = rows_of(records, self._size, self._context, "step", rest)
-            name = f"{self._folder}, episode {number}"
-            yield ExchangeEpisode(header=about, rows=rows, name=name, outcome=outcome)
-            if self._most_bytes < 0:
-                raise DemosError(f"{self._folder} has images of far more bytes than its files.")
+            head, outcome, drivers = replace(header, notes=header.notes | task), "", list[Driver]()
+            if own:
+                ours, outcome, fields = own[number]
+                head, drivers = _own(ours, head, fields, f"{path}, episode {number}")
+            yield ExchangeEpisode(
+                header=head,
+                records=self._records(entry, drivers),
+                name=f"episode {number}",
+                outcome=outcome,
+            )
 
     def _choose_features(self, features: Sequence[_Feature]) -> None:
         """Choose the action, the states, the camera and single numbers, and report the others."""
@@ -208,10 +203,9 @@ class _Dataset:
             if feature.key not in taken and feature is not self._camera:
                 about = f"{feature.key} ({feature.kind}, {' x '.join(map(str, feature.shape))})"
                 if feature.role == "unknown image":
-                    reason = "with images of an unknown kind or of depth"
-                    context.leave_out("feature", reason, about)
+                    context.report("left out", "images of an unknown kind or of depth", about)
                 else:
-                    context.note(f"The feature {about} is not imported.")
+                    context.report("note", f"The feature {about} is not imported.")
 
     def _read_entries(self) -> dict[int, _Entry]:
         """Return the rows of `meta/episodes` by their number, in order."""
@@ -229,7 +223,7 @@ class _Dataset:
         totals = self._info.total_episodes, self._info.total_frames
         if totals != (count := (len(entries), sum(entry.length for entry in entries))):
             about = "{} has {} episodes with {} steps, and {} {} with {}."
-            self._context.warn(about.format(INFO, *totals, EPISODES, *count))
+            self._context.report("warning", about.format(INFO, *totals, EPISODES, *count))
         return dict(sorted(found.items()))
 
     def _groups_of(self, path: Path) -> dict[float, set[int]]:
@@ -244,9 +238,11 @@ class _Dataset:
             names = files.library("pyarrow.parquet", "lerobot").read_schema(path).names
             for column in sorted(set(names) - self._info.features.keys()):
                 if not column.startswith("__index_level_"):  # Of pandas.
-                    self._context.leave_out("column", f"that {INFO} does not describe", column)
+                    text = f"a column that {INFO} does not describe"
+                    self._context.report("left out", text, column)
             for number in sorted(found.keys() - self._entries.keys()):
-                self._context.leave_out("episode", f"that {EPISODES} does not have", f"{number:g}")
+                text = f"{EPISODES} does not have it"
+                self._context.report("left out", text, f"episode {number:g}")
         return self._groups[path]
 
     def _data_file(self, entry: _Entry) -> Path:
@@ -272,59 +268,57 @@ class _Dataset:
     def _video_name(self, entry: _Entry) -> str:
         return self._named(self._info.video_path or "", entry.video_chunk, entry.video_file)
 
-    def _read_video(self, name: str) -> VideoTimes | str:
-        """Return the times of a video, or why its episodes are left out."""
+    def _read_video(self, name: str) -> VideoTimes:
+        """Return the times of a video, if they are those that its entries state."""
         entries = self._filmed[name]
-        try:
-            times = read_times(files.inside(self._folder, name, self._folder / EPISODES))
-        except DemosError as error:
-            return f"whose video cannot be read: {str(error).removesuffix('.')}"
+        times = read_times(files.inside(self._folder, name, self._folder / EPISODES))
         if times.size != self._size:
-            return f"whose images in {name} have {times.size} pixels, not {self._size}"
+            raise DemosError(f"{name} has images of {times.size} pixels, not {self._size}.")
         spans_s = np.array(sorted((entry.from_timestamp, entry.to_timestamp) for entry in entries))
         steps_s = np.diff(times.seconds)
         half_s = 0.5 * float(np.median(steps_s)) if len(steps_s) else 0.5 / self._info.fps
         shown_s = times.seconds[[0, -1]] + [0.0, 2.0 * half_s]
         told_s = spans_s[[0, -1], [0, 1]]
         lost_s = (shown_s - told_s) * [1.0, -1.0]  # At the begin and at the end.
-        about = "{}, which shows {:.4g} to {:.4g} s where {} says {:.4g} to {:.4g} s".format(
+        about = "{} shows {:.4g} to {:.4g} s where {} says {:.4g} to {:.4g} s".format(
             name, *shown_s, EPISODES, *told_s
         )
         # If an image is lost, the ones after it moved up, and nothing says which one is lost.
         if lost_s.max() > half_s:
-            return f"of {about}"
+            raise DemosError(f"{about}.")
         if lost_s.min() < -half_s:
-            self._context.warn(f"There are more images in {about}.")
+            self._context.report("warning", f"There are more images: {about}.")
         if (np.diff(spans_s.ravel()) < -half_s).any():
-            return f"whose parts of {name} overlap, or end before they begin"
+            raise DemosError(f"Parts of {name} overlap, or end before they begin.")
         return times
 
-    def _pictures(self, entry: _Entry) -> Iterator[NDArray[np.uint8]] | str:
-        """Return the image of each step of an episode, or why it is left out."""
+    def _pictures(self, entry: _Entry) -> Iterator[NDArray[np.uint8]]:
+        """Return the image of each step of an episode; refuse an episode that lacks one."""
         name = self._video_name(entry)
         if name not in self._videos:
-            self._videos[name] = self._read_video(name)
-        if isinstance(times := self._videos[name], str):
-            return times
+            try:
+                self._videos[name] = self._read_video(name)
+            except DemosError as error:
+                self._videos[name] = error
+        times = self._videos[name]
+        if isinstance(times, DemosError):
+            raise times
         at_s = entry.from_timestamp + np.arange(entry.length) / self._info.fps
         most_s = _TOLERANCE_S + _ROUNDING * at_s + 0.5 * float(times.tick_s)
         nearest = np.searchsorted((times.seconds[1:] + times.seconds[:-1]) / 2.0, at_s)
         off_s = np.abs(times.seconds[nearest] - at_s)
         if not (off_s <= most_s).all() or at_s[-1] > entry.to_timestamp - 2.0 * most_s[-1]:
-            return f"without an image within {_TOLERANCE_S * 1e3:g} ms of each step"
+            raise DemosError(
+                f"{name} lacks an image within {_TOLERANCE_S * 1e3:g} ms of each step."
+            )
         return read_pictures(self._folder / name, times, times.ticks[nearest])
 
-    def _records(
-        self,
-        entry: _Entry,
-        pictures: Iterable[NDArray[np.uint8] | None],
-        drivers: Sequence[Driver],
-    ) -> Iterator[SourceRecord]:
-        """Yield the records of an episode, up to the first rows with other keys than expected."""
+    def _records(self, entry: _Entry, drivers: Sequence[Driver]) -> Iterator[Record]:
+        """Yield the records of an episode; refuse rows with other keys than expected."""
         number, rate_hz = entry.episode_index, self._info.fps
         sizes = {f.key: f.size for f in (self._action, *self._states)}
         sizes |= dict.fromkeys((*self._columns, *_KEYS), 1)
-        steps = enumerate(pictures)
+        steps = enumerate(self._pictures(entry) if self._video else repeat(None, entry.length))
         done, read = 0, b""
         stored = [self._stored] if self._stored else []
         path = self._data_file(entry)
@@ -345,18 +339,18 @@ class _Dataset:
                 raise DemosError(f"{path}: keys of episode {number} do not fit {EPISODES}.")
             images = batch.column(self._stored)[here] if stored else None
             for row in range(rows):
-                frame, picture = next(steps)
+                frame, image = next(steps)
                 single = {key: float(columns[key][row, 0]) for key in self._columns}
                 reward, is_done = single.get(_REWARD, math.nan), bool(single.get(DONE, False))
                 ended = bool(single.get(_TERMINATED, is_done))
                 if images is not None:
-                    picture = _bytes(images[row].as_py())
-                    self._most_bytes -= 0 if picture == read else len(picture)
-                    read = picture
+                    image = _bytes(images[row].as_py())
+                    self._most_bytes -= 0 if image == read else len(image)
+                    read = image
                     if self._most_bytes < 0:
-                        raise DemosError(f"{path} has images of far more bytes than its own.")
-                yield SourceRecord(
-                    name=f"{frame} of episode {number}",
+                        raise DemosError(f"{path} has images of far more bytes than its files.")
+                yield Record(
+                    name=f"step {frame} of episode {number}",
                     step=Step(
                         action=tuple(columns[_ACTION][row].tolist()),
                         driver=drivers[frame] if frame < len(drivers) else "person",
@@ -366,7 +360,7 @@ class _Dataset:
                         terminated=ended,
                         truncated=is_done and not ended,
                     ),
-                    picture=picture,
+                    image=image,
                     frame=frame if self._video else None,
                 )
         if done < entry.length:
@@ -399,16 +393,18 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
         prefix = "" if feature.key in {_ACTION, _STATE} else f"{key}/"
         names = [name and prefix + name for name in _flat_names(feature.names)]
         if names and (len(set(names)) != size or not all(names)):
-            context.note(f"The names of {feature.key} do not fit its {size} values: numbers do.")
+            text = f"The names of {feature.key} do not fit its {size} values: numbers do."
+            context.report("note", text)
             names = []
         found += features_of(key, size, names=names, units=_flat_names(feature.units))
     return as_json(found)
 
 
-def _own(plain: Any, found: EpisodeHeader, where: str) -> tuple[EpisodeHeader, str, list[Driver]]:
-    """Return the header and the outcome of an own episode, and the driver of each step."""
-    header, outcome = files.own_header(plain, where)
-    runs = files.converted(plain.get("drivers", []), list[tuple[Driver, int]], where)
+def _own(
+    header: EpisodeHeader, found: EpisodeHeader, fields: dict[str, Any], where: str
+) -> tuple[EpisodeHeader, list[Driver]]:
+    """Return the header of an own episode, with the notes of `found`, and each step's driver."""
+    runs = files.converted(fields.get("drivers", []), list[tuple[Driver, int]], where)
     drivers = islice(chain.from_iterable(repeat(*run) for run in runs), _MOST)
     ours, theirs = ((one.actions.size, one.states.size, one.image_size) for one in (header, found))
     if ours != theirs:
@@ -418,7 +414,7 @@ def _own(plain: Any, found: EpisodeHeader, where: str) -> tuple[EpisodeHeader, s
         )
     # The times come from the dataset.
     clock = "real" if header.clock == "none" else header.clock
-    return replace(header, clock=clock, notes=found.notes | header.notes), outcome, list(drivers)
+    return replace(header, clock=clock, notes=found.notes | header.notes), list(drivers)
 
 
 def _batches(
@@ -468,6 +464,7 @@ FORMAT: Final = Format(
     read=lambda folder, context: _Dataset(folder, context).read(),
     write=write,
     options=frozenset({"camera", "task", "images"}),
+    alike=("actions", "states", "image_size", "control_hz"),
     consecutive=True,
     timed=False,
 )

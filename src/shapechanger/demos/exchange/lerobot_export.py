@@ -34,10 +34,10 @@ from shapechanger.demos.exchange.format import (
     COLUMNS,
     ExchangeEpisode,
     ExportContext,
-    decoded_steps,
+    decoded_images,
     value_names,
 )
-from shapechanger.demos.exchange.pictures import VideoWriter
+from shapechanger.demos.exchange.video import VideoWriter
 from shapechanger.errors import DemosError
 
 INFO: Final = "meta/info.json"
@@ -132,7 +132,7 @@ class _Dataset:
         self._parts += parts
         self._levels += levels
         runs = [[driver, len(list(group))] for driver, group in groupby(drivers)]
-        self._headers.append(own_fields(episode) | {"drivers": runs})
+        self._headers.append(own_fields(header, episode.outcome) | {"drivers": runs})
         self.steps += count
 
     def _new_video(self) -> VideoWriter:
@@ -150,11 +150,10 @@ class _Dataset:
 
     def _with_images(
         self, episode: ExchangeEpisode, video: VideoWriter | None, levels: NDArray[np.int64]
-    ) -> Iterator[tuple[Step, bytes]]:
+    ) -> Iterator[tuple[Step, bytes | None]]:
         """Yield steps with their images, and add the images to the video and the levels."""
         shown, counts = np.empty(0, np.uint8), np.zeros_like(levels)
-        size = self._header.image_size
-        for row, jpeg, pixels in decoded_steps(episode.rows, size, episode.name, "LeRobot"):
+        for record, pixels in decoded_images(episode, "LeRobot"):
             if pixels is not None:
                 colours = pixels.reshape(-1, 3).T
                 counts = np.stack([np.bincount(c, minlength=_LEVELS) for c in colours], axis=1)
@@ -162,7 +161,7 @@ class _Dataset:
             levels += counts
             if video is not None:
                 video.add(shown)
-            yield row.step, jpeg
+            yield record.step, record.jpeg
 
     def _columns(self, steps: Sequence[Step], first: int, task: str) -> _Columns:
         """Return the numbers of steps, the first one with a number, shape (n, k) each."""
@@ -184,7 +183,7 @@ class _Dataset:
             "task_index": np.full_like(frames, self._tasks.index(task)),
         }
 
-    def _write_rows(self, columns: _Columns, jpegs: Sequence[bytes], name: str) -> None:
+    def _write_rows(self, columns: _Columns, jpegs: Sequence[bytes | None], name: str) -> None:
         """Append rows to the table, which the first ones create."""
         arrow = self._arrow
         stored: dict[str, Any] = {}

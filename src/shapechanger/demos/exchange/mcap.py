@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext, Format
+from shapechanger.demos.exchange.format import ExchangeEpisode, ExportContext, Format, Record
 from shapechanger.layout import Layout
 
 _NS_PER_S: Final = 10**9
@@ -78,29 +78,30 @@ def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
         number = writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
         channels[topic] = writer.register_channel(f"/{topic}", "json", number)
     period_ns = round(_NS_PER_S / header.control_hz)
-    seen_ns = -period_ns
-    for steps, row in enumerate(episode.rows, 1):  # noqa: B007
-        clock_ns = row.step.clock_ns
+    seen_ns, shown = -period_ns, None
+    for steps, record in enumerate(episode.records, 1):  # noqa: B007
+        clock_ns = record.step.clock_ns
         if clock_ns is None or clock_ns < 0:  # MCAP has no negative times.
             clock_ns = max(0, seen_ns + period_ns)
         seen_ns = clock_ns
-        acted_ns = max(seen_ns, row.step.decided_ns or 0)
-        for topic, message in _messages(row, seen_ns, layouts):
+        acted_ns = max(seen_ns, record.step.decided_ns or 0)
+        for topic, message in _messages(record, record.jpeg is not shown, seen_ns, layouts):
             at_ns = seen_ns if topic in {"camera", "state"} else acted_ns
             data = json.dumps(message, allow_nan=False).encode()
             writer.add_message(channels[topic], log_time=at_ns, publish_time=at_ns, data=data)
+        shown = record.jpeg
     return steps
 
 
 def _messages(
-    row: ExchangeStep, seen_ns: int, layouts: Mapping[str, Layout]
+    record: Record, is_new: bool, seen_ns: int, layouts: Mapping[str, Layout]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the topics and the messages of a step."""
-    step = row.step
-    if row.jpeg is not None:
+    step = record.step
+    if is_new and record.jpeg is not None:
         sec, nsec = divmod(seen_ns, _NS_PER_S)
         about = {"timestamp": {"sec": sec, "nsec": nsec}, "frame_id": "camera", "format": "jpeg"}
-        yield "camera", about | {"data": base64.b64encode(row.jpeg).decode()}
+        yield "camera", about | {"data": base64.b64encode(record.jpeg).decode()}
     for topic, layout in layouts.items():
         if (values := getattr(step, topic)) is not None:
             yield topic, _by_name(layout, values)
@@ -109,7 +110,7 @@ def _messages(
         yield "reward", {"reward": _known(step.reward), "terms": terms}
     always = {name: getattr(step, name) for name in ("driver", "terminated", "truncated")}
     more = {"stop_reason": step.stop_reason or None, "wall_ns": step.wall_ns}
-    more |= {"marks": list(row.marks) or None, "dropped": row.dropped}
+    more |= {"marks": list(record.marks) or None, "dropped": record.dropped}
     known = {name: value for name, value in more.items() if value is not None}
     yield "step", {"step": step.index} | always | known
 

@@ -2,10 +2,10 @@
 
 An observation is the image, the state, or a dictionary of both; the last one is repeated, because
 Minari needs one more than there are steps. An image is stored as the recorded JPEG, which Minari
-decodes on reading. Images below 32 pixels, which Minari does not store as JPEG, are stored as
-pixels, with the JPEG in `infos/jpeg`. `infos/frame` is the index of the image in the episode, the
-same for steps that share an image, and `infos/step` contains all fields without a separate column,
-as JSON. An unknown reward is NaN. `metadata.json` has the headers of the episodes.
+decodes on reading; it does not for images below 32 pixels, which are not exported. `infos/frame` is
+the index of the image in the episode, the same for steps that share an image, and `infos/step`
+contains all fields without a separate column, as JSON. An unknown reward is NaN. `metadata.json`
+has the headers of the episodes.
 
 Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
 encodes each image again at JPEG quality 75, and needs the whole episode in memory.
@@ -19,7 +19,7 @@ import math
 import re
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
@@ -32,7 +32,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files, pictures
+from shapechanger.demos.exchange import files
 from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library
 from shapechanger.demos.exchange.format import (
     COLUMNS,
@@ -41,13 +41,13 @@ from shapechanger.demos.exchange.format import (
     ExportContext,
     Format,
     ImportContext,
-    SourceRecord,
+    Record,
     as_json,
-    decoded_steps,
+    decoded_images,
     features_of,
     few,
 )
-from shapechanger.demos.jpeg import MAX_PIXELS, is_grey, picture_size
+from shapechanger.demos.jpeg import MAX_PIXELS, is_grey
 from shapechanger.errors import DemosError, translate_errors
 from shapechanger.layout import Feature
 
@@ -55,7 +55,7 @@ _DATA: Final = "data"
 _METADATA: Final = "metadata.json"
 _MAIN: Final = "main_data.hdf5"
 _OURS: Final = "shapechanger"  # Key of our own section in `metadata.json`.
-_OBSERVATIONS, _FRAME, _JPEG = "observations", "infos/frame", "infos/jpeg"
+_OBSERVATIONS, _FRAME = "observations", "infos/frame"
 _ACTION, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
     COLUMNS[field]["minari"] for field in ("action", "reward", "terminated", "truncated", "driver")
 )
@@ -79,18 +79,6 @@ class _Rest(msgspec.Struct):
     step: dict[str, Any]
     marks: tuple[str, ...]
     dropped: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class _Parts:
-    """The columns of an episode; columns of action and state map to their number of values."""
-
-    header: EpisodeHeader
-    action: Mapping[str, int]
-    state: Mapping[str, int]
-    picture: str = ""
-    pixels: tuple[int, ...] = ()  # The shape of an image; () for JPEG.
-    infos: Sequence[str] = ()  # Only in datasets from Shapechanger.
 
 
 def _data_folder(folder: Path) -> Path | None:
@@ -123,119 +111,153 @@ def _arrays(file: Any, number: int) -> dict[str, Any]:
     }
 
 
-def _columns(file: Any, number: int, parts: _Parts) -> dict[str, Any]:
-    """Return the columns of an episode, keyed by name; refuse columns that do not fit together."""
-    where, arrays = f"{file.filename}, episode_{number}", _arrays(file, number)
-    sizes = {_TERMINATED: 1, _TRUNCATED: 1, **parts.action, **parts.state}
-    sizes |= {_REWARD: 1} if parts.infos or _REWARD in arrays else {}
-    names = [*sizes, *parts.infos, *filter(None, [parts.picture])]
-    if missing := [name for name in names if name not in arrays]:
-        raise DemosError(f"{where} has no {missing[0]!r} that is an array in this file.")
-    columns = {name: arrays[name] for name in names}
-    steps = len(columns[_TERMINATED])
-    for name, one in columns.items():
-        # HDF5 unpacks whole chunks.
-        unpacked = max(
-            one.nbytes // max(1, len(one)), math.prod(one.chunks or ()) * one.dtype.itemsize
+class _Dataset:
+    """A dataset that is read; columns of action and state map to their number of values."""
+
+    def __init__(self, folder: Path, context: ImportContext) -> None:
+        place = _data_folder(folder) or folder
+        self._path = path = place / _METADATA
+        self._context = context
+        metadata = files.read_json(path)
+        if (stored := metadata.get("data_format", "hdf5")) != "hdf5":
+            raise DemosError(f"{folder} is stored as {stored!r}: only 'hdf5' is read.")
+        self._main = files.inside(place, _MAIN, path)
+        self._count, self._most = metadata.get("total_episodes"), self._main.stat().st_size
+        if type(self._count) is not int or not 1 <= self._count <= self._most:
+            raise DemosError(
+                f"{path}: total_episodes must be a positive integer, got {self._count!r}."
+            )
+        self._claimed = 0
+        has_own = _OURS in metadata
+        self._own = files.own_episodes(metadata[_OURS], path, self._count) if has_own else []
+        observed, acted = (
+            _leaves(metadata, f"{of}_space", path) for of in ("observation", "action")
         )
-        if unpacked > MAX_UNPACKED:
-            raise DemosError(f"{where}: {name!r} unpacks to {unpacked} bytes, more than the limit.")
-        # The last observation follows the last step.
-        if len(one) not in {steps, steps + name.startswith(_OBSERVATIONS)}:
-            raise DemosError(f"{where}: {name!r} has {len(one)} entries for {steps} steps.")
-        numeric = one.dtype.kind in "biuf" and math.prod(one.shape[1:]) == sizes.get(name)
-        if name in sizes and not numeric:
-            raise DemosError(f"{where}: {name!r} does not have {sizes[name]} numbers in a row.")
-        fits = one.dtype == np.uint8 and one.shape[1:] == parts.pixels
-        if name == parts.picture and parts.pixels and not fits:
-            raise DemosError(f"{where}: {name!r} has images that do not fit their space.")
-    stated = file[f"episode_{number}"].attrs.get("total_steps", steps)
-    if not np.array_equal(np.ravel(stated), [steps]):
-        raise DemosError(f"{where} has {steps} steps, but its total_steps is {stated}.")
-    return columns
+        images = {at: size for at, space in observed.items() if (size := _picture_size(space))}
+        if len(images) > 1:
+            raise DemosError(f"{path} has {len(images)} images ({', '.join(images)}): keep one.")
+        sensed = {at: space for at, space in observed.items() if at not in images}
+        states = _features(sensed, _OBSERVATIONS, context)
+        actions = _features(acted, _ACTION, context)
+        if len(actions) < len(acted):
+            names = "Box, Discrete, MultiDiscrete or MultiBinary"
+            raise DemosError(f"{path}: the action_space must consist of {names}.")
+        hz = metadata.get("control_hz", context.hz)
+        known = type(hz) in {int, float} and math.isfinite(hz) and hz > 0.0
+        if not known:
+            text = f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it."
+            context.report("note", text)
+        self._header = EpisodeHeader(
+            action_layout=as_json(list(chain(*actions.values()))),
+            state_layout=as_json(list(chain(*states.values()))),
+            image_size=next(iter(images.values()), None),
+            control_hz=float(hz) if known else DEFAULT_HZ,
+            clock="none",
+            source="minari",
+            notes={"dataset": str(metadata.get("dataset_id", "")), "rate_is_known": known},
+        )
+        self._action = {at: sum(one.size for one in part) for at, part in actions.items()}
+        self._state = {at: sum(one.size for one in part) for at, part in states.items()}
+        self._picture = "".join(_OBSERVATIONS + at for at in images)
+        is_jpeg = bool(metadata.get("jpeg_encoding", True)) and all(
+            library(_STORAGE).is_image_space(observed[at]) for at in images
+        )
+        # The shape of an image; None for JPEG.
+        self._pixels = None if is_jpeg else next((observed[at].shape for at in images), None)
 
+    def read(self) -> Iterator[ExchangeEpisode]:
+        """Yield the episodes."""
+        with _opened(self._main) as file:
+            if (groups := sum(name.startswith("episode_") for name in file)) != self._count:
+                text = f"total_episodes is {self._count}, and {_MAIN} has {groups} episodes."
+                self._context.report("warning", text)
+        for number in range(self._count):
+            header, outcome, _ = self._own[number] if self._own else (self._header, "", None)
+            yield ExchangeEpisode(
+                header=header,
+                records=self._records(number),
+                name=f"episode_{number} of {_MAIN}",
+                outcome=outcome,
+            )
 
-def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
-    place = _data_folder(folder) or folder
-    path = place / _METADATA
-    metadata = files.read_json(path)
-    if metadata.get("data_format", "hdf5") != "hdf5":
-        raise DemosError(f"{folder} is stored as {metadata['data_format']!r}: only 'hdf5' is read.")
-    main = files.inside(place, _MAIN, path)
-    count, most, claimed = metadata.get("total_episodes"), main.stat().st_size, 0
-    if type(count) is not int or not 1 <= count <= most:
-        raise DemosError(f"{path}: total_episodes must be a positive integer, got {count!r}.")
-    ours = files.own_episodes(metadata[_OURS], path, count) if _OURS in metadata else []
-    theirs = _parts(metadata, path, context)
-    others, outcome = set[str](), ""
-    for number in range(count):
-        try:
-            with _opened(main) as file:
-                infos = {name for name in _arrays(file, number) if name.startswith("infos/")}
-                parts = theirs
-                if ours:
-                    header, outcome = files.own_header(ours[number], path)
-                    picture = _JPEG if _JPEG in infos else theirs.picture
-                    named = (_STEP, _FRAME) if picture else (_STEP,)
-                    parts = replace(theirs, header=header, picture=picture, pixels=(), infos=named)
-                columns = _columns(file, number, parts)
-                steps = len(columns[_TERMINATED])
-        except DemosError as error:
-            context.leave_out("episode", pictures.unreadable(error), number)
-            continue
-        others |= set() if ours else infos
-        if _REWARD not in columns:
-            context.warn(f"{main.name} lacks rewards: the steps of such episodes have none.")
+    def _columns(self, file: Any, number: int) -> dict[str, Any]:
+        """Return the columns of an episode; refuse columns that do not fit together."""
+        where, arrays = f"episode_{number}", _arrays(file, number)
+        sizes = {_TERMINATED: 1, _TRUNCATED: 1, **self._action, **self._state}
+        if self._own or _REWARD in arrays:
+            sizes[_REWARD] = 1
+        else:
+            text = f"{_MAIN} lacks rewards: the steps of such episodes have none."
+            self._context.report("warning", text)
+        images = [self._picture] if self._picture else []
+        infos = [_STEP, *([_FRAME] if images else [])] if self._own else []
+        names = [*sizes, *infos, *images]
+        if missing := [name for name in names if name not in arrays]:
+            raise DemosError(f"{where} has no {missing[0]!r} that is an array in this file.")
+        others = sorted(name for name in arrays if name.startswith("infos/"))
+        if others and not self._own:
+            self._context.report("note", f"The infos are not imported: {few(others)}.")
+        columns = {name: arrays[name] for name in names}
+        steps = len(columns[_TERMINATED])
+        for name, one in columns.items():
+            # HDF5 unpacks whole chunks.
+            row, chunk = one.nbytes // max(1, len(one)), math.prod(one.chunks or ())
+            if (unpacked := max(row, chunk * one.dtype.itemsize)) > MAX_UNPACKED:
+                raise DemosError(f"{where}: {name!r} unpacks to {unpacked} bytes: too many.")
+            # The last observation follows the last step.
+            if len(one) not in {steps, steps + name.startswith(_OBSERVATIONS)}:
+                raise DemosError(f"{where}: {name!r} has {len(one)} entries for {steps} steps.")
+            numeric = one.dtype.kind in "biuf" and math.prod(one.shape[1:]) == sizes.get(name)
+            if name in sizes and not numeric:
+                raise DemosError(f"{where}: {name!r} does not have {sizes[name]} numbers in a row.")
+            fits = one.dtype == np.uint8 and one.shape[1:] == self._pixels
+            if name in images and self._pixels and not fits:
+                raise DemosError(f"{where}: {name!r} has images that do not fit their space.")
+        stated = file[where].attrs.get("total_steps", steps)
+        if not np.array_equal(np.ravel(stated), [steps]):
+            raise DemosError(f"{where} has {steps} steps, but its total_steps is {stated}.")
         # HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
-        if (claimed := claimed + 3 * steps) > most:
-            raise DemosError(f"{main} claims at least {claimed} values, but has {most} bytes.")
-        rest = [f"{n} of episode_{number}" for n in range(steps)]
-        records, size = _records(main, number, parts), parts.header.image_size
-        rows = pictures.rows_of(records, size, context, "step", rest)
-        name = f"{main}, episode_{number}"
-        yield ExchangeEpisode(header=parts.header, rows=rows, name=name, outcome=outcome)
-    with _opened(main) as file:
-        if (groups := sum(name.startswith("episode_") for name in file)) != count:
-            context.warn(f"total_episodes is {count}, and {main.name} has {groups} episodes.")
-    if others:
-        context.note(f"The infos are not imported: {few(sorted(others))}.")
+        self._claimed += 3 * steps
+        if self._claimed > self._most:
+            raise DemosError(
+                f"{_MAIN} claims at least {self._claimed} values, but has {self._most} bytes."
+            )
+        return columns
 
+    def _records(self, number: int) -> Iterator[Record]:
+        with _opened(self._main) as file:
+            columns = self._columns(file, number)
+            steps, size = len(columns[_TERMINATED]), sum(one.nbytes for one in columns.values())
+            chunk = max(1, min(_CHUNK, steps * MAX_UNPACKED // max(1, size)))
+            for start in range(0, steps, chunk):
+                part = {name: at[start : min(start + chunk, steps)] for name, at in columns.items()}
+                for n in range(len(part[_TERMINATED])):
+                    row = {name: values[n] for name, values in part.items()}
+                    name = f"step {start + n} of episode_{number}"
+                    wrong = f"{_STEP} of {name} is damaged"
+                    with translate_errors(
+                        *_BAD_JSON, to=lambda e, w=wrong: DemosError(f"{w}: {e}.")
+                    ):
+                        record = self._record(row, start + n)
+                    record.name = name
+                    yield record
 
-def _parts(metadata: Mapping[str, Any], path: Path, context: ImportContext) -> _Parts:
-    """Return the columns of all episodes, according to the spaces in the metadata."""
-    observed, acted = (_leaves(metadata, f"{of}_space", path) for of in ("observation", "action"))
-    pictures = {at: size for at, space in observed.items() if (size := _picture_size(space))}
-    if len(pictures) > 1:
-        raise DemosError(f"{path} has {len(pictures)} images ({', '.join(pictures)}): keep one.")
-    sensed = {at: space for at, space in observed.items() if at not in pictures}
-    states = _features(sensed, _OBSERVATIONS, context)
-    actions = _features(acted, _ACTION, context)
-    if len(actions) < len(acted):
-        names = "Box, Discrete, MultiDiscrete or MultiBinary"
-        raise DemosError(f"{path}: the action_space must consist of {names}.")
-    hz = metadata.get("control_hz", context.hz)
-    known = type(hz) in {int, float} and math.isfinite(hz) and hz > 0.0
-    if not known:
-        context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
-    header = EpisodeHeader(
-        action_layout=as_json(list(chain(*actions.values()))),
-        state_layout=as_json(list(chain(*states.values()))),
-        image_size=next(iter(pictures.values()), None),
-        control_hz=float(hz) if known else DEFAULT_HZ,
-        clock="none",
-        source="minari",
-        notes={"dataset": str(metadata.get("dataset_id", "")), "rate_is_known": known},
-    )
-    is_jpeg = bool(metadata.get("jpeg_encoding", True)) and all(
-        library(_STORAGE).is_image_space(observed[at]) for at in pictures
-    )
-    return _Parts(
-        header=header,
-        action={at: sum(one.size for one in features) for at, features in actions.items()},
-        state={at: sum(one.size for one in features) for at, features in states.items()},
-        picture="".join(_OBSERVATIONS + at for at in pictures),
-        pixels=() if is_jpeg else next((observed[at].shape or () for at in pictures), ()),
-    )
+    def _record(self, row: Mapping[str, Any], number: int) -> Record:
+        (reward,) = _numbers(row, [_REWARD]) if _REWARD in row else [math.nan]
+        fields: dict[str, Any] = {"driver": "expert", "truncated": bool(row[_TRUNCATED])}
+        rest = _Rest(step=fields, marks=(), dropped=None)
+        if self._own:
+            rest = msgspec.json.decode(row[_STEP], type=_Rest)
+        if "reward" in rest.step or not (self._own or math.isnan(reward)):
+            rest.step["reward"] = reward
+        action, state = (_numbers(row, names) for names in (self._action, self._state))
+        known = {"action": action, "state": state, "terminated": bool(row[_TERMINATED])}
+        record = Record(step=Step.from_json(rest.step | known))
+        record.marks, record.dropped = rest.marks, rest.dropped
+        if self._picture:
+            record.frame, stored = int(row.get(_FRAME, number)), row[self._picture]
+            record.image = _pixels(stored) if self._pixels else bytes(stored)
+        return record
 
 
 def _leaves(metadata: Mapping[str, Any], name: str, path: Path) -> dict[str, spaces.Space[Any]]:
@@ -285,10 +307,10 @@ def _features(
             case spaces.MultiBinary():
                 ends = 0, 1
             case _:
-                context.note(f"The {what} {name} ({space}) is not imported.")
+                context.report("note", f"The {what} {name} ({space}) is not imported.")
         if ends and (not 0 < size <= MAX_VALUES or (len(shape) > 1 and str(space.dtype) in _DEEP)):
-            reason = f"of no or more than {MAX_VALUES} values, or with images of depth"
-            context.leave_out(what, reason, f"{name} ({space})")
+            reason = f"no or more than {MAX_VALUES} values, or images of depth"
+            context.report("left out", reason, f"{what} {name} ({space})")
         elif ends:
             low, high = (
                 np.broadcast_to(np.ravel(end).astype(float), size).tolist() for end in ends
@@ -314,36 +336,6 @@ def _colours_first(shape: tuple[int, ...]) -> bool:
     return len(shape) == 3 and shape[0] in _CHANNELS and shape[2] not in _CHANNELS
 
 
-def _records(main: Path, number: int, parts: _Parts) -> Iterator[SourceRecord]:
-    with _opened(main) as file:
-        columns = _columns(file, number, parts)
-        steps, size = len(columns[_TERMINATED]), sum(one.nbytes for one in columns.values())
-        chunk = max(1, min(_CHUNK, steps * MAX_UNPACKED // max(1, size)))
-        for start in range(0, steps, chunk):
-            part = {name: at[start : min(start + chunk, steps)] for name, at in columns.items()}
-            for n, ended in enumerate(part[_TERMINATED]):
-                row = {name: values[n] for name, values in part.items()}
-                fields = {"driver": "expert", "truncated": bool(row[_TRUNCATED])}
-                rest = _Rest(step=fields, marks=(), dropped=None)
-                (reward,) = _numbers(row, [_REWARD]) if _REWARD in row else [math.nan]
-                why = f"{_STEP} of step {start + n} of episode_{number} is damaged"
-                with translate_errors(*_BAD_JSON, to=lambda e, why=why: DemosError(f"{why}: {e}.")):
-                    if parts.infos:
-                        rest = msgspec.json.decode(row[_STEP], type=_Rest)
-                    if "reward" in rest.step or not (parts.infos or math.isnan(reward)):
-                        rest.step["reward"] = reward
-                    action, state = (_numbers(row, names) for names in (parts.action, parts.state))
-                    known = {"action": action, "state": state, "terminated": bool(ended)}
-                    step = Step.from_json(rest.step | known)
-                    frame = int(row.get(_FRAME, start + n))
-                record = SourceRecord(name=f"{start + n} of episode_{number}", step=step)
-                record.marks, record.dropped = rest.marks, rest.dropped
-                if parts.picture:
-                    record.frame, stored = frame, row[parts.picture]
-                    record.picture = _pixels(stored) if parts.pixels else bytes(stored)
-                yield record
-
-
 def _numbers(row: Mapping[str, Any], names: Iterable[str]) -> list[float]:
     return [value for name in names for value in np.ravel(row[name]).astype(float).tolist()]
 
@@ -363,10 +355,11 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
             f"Minari loads a dataset by its name, which must end in a version: call it "
             f"{context.out.with_name(f'{better}-v0')}, not {context.out}."
         )
-    header, rows = episodes[0].header, iter(episodes[0].rows)
-    first = next(rows)
-    space, picture = _space_of(episodes[0], first.jpeg)
-    episodes = [replace(episodes[0], rows=chain((first,), rows)), *episodes[1:]]
+    header, records = episodes[0].header, iter(episodes[0].records)
+    first = next(records)
+    grey = header.image_size is not None and is_grey(first.jpeg or b"", "of the first step")
+    space = _space_of(episodes[0], grey)
+    episodes = [replace(episodes[0], records=chain((first,), records)), *episodes[1:]]
     storage = library(_STORAGE).MinariStorage.new(
         (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
         observation_space=space,
@@ -377,13 +370,14 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
     with library("h5py").File(folder / _DATA / _MAIN, "a", track_order=True) as file:
         for number, episode in enumerate(episodes):
             group = file.create_group(f"episode_{number}")
-            steps = _write_episode(group, episode, picture)
+            steps = _write_episode(group, episode, grey)
             group.attrs.update({"id": number, "total_steps": len(steps)})
             if episode.header.seed is not None:
                 group.attrs["seed"] = episode.header.seed
             drivers.update(step.driver for step in steps)
             total += len(steps)
     plain = header.to_json()
+    own = [files.own_fields(episode.header, episode.outcome) for episode in episodes]
     about: dict[str, Any] = {
         "dataset_id": name,
         "minari_version": version("minari"),
@@ -392,7 +386,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
         "action_layout": plain["action_layout"],
         "observation_layout": plain["state_layout"],
         "control_hz": header.control_hz,
-        _OURS: {"format": 1, "episodes": list(map(files.own_fields, episodes))},
+        _OURS: {"format": 1, "episodes": own},
         "total_episodes": len(episodes),
         "total_steps": total,
         "dataset_size": storage.get_size(),
@@ -408,23 +402,27 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
     return total
 
 
-def _space_of(episode: ExchangeEpisode, jpeg: bytes | None) -> tuple[Any, spaces.Box | None]:
-    """Return the space of all observations, from the first image, and its subspace of images."""
-    header, found, picture = episode.header, dict[str, spaces.Space[Any]](), None
-    if jpeg is not None or header.image_size is not None:
-        where = f"of the first step of {episode.name}"
-        width, height = header.image_size or picture_size(jpeg or b"", where)
-        grey = bool(jpeg) and is_grey(jpeg, where)
-        shape = (height, width) if grey else (height, width, 3)
-        found["image"] = picture = spaces.Box(0, 255, shape, np.uint8)
+def _space_of(episode: ExchangeEpisode, grey: bool) -> spaces.Space[Any]:
+    """Return the space of all observations."""
+    header, found = episode.header, dict[str, spaces.Space[Any]]()
+    if header.image_size is not None:
+        width, height = header.image_size
+        found["image"] = image = spaces.Box(
+            0, 255, (height, width) if grey else (height, width, 3), np.uint8
+        )
+        if not library(_STORAGE).is_image_space(image):
+            raise DemosError(
+                f"Minari does not store images of {width} x {height} pixels as JPEG: export them "
+                "to csv or lerobot."
+            )
     if header.state_layout:
         found["state"] = spaces.Box(header.states.low, header.states.high, dtype=np.float64)
     if not found:
         raise DemosError(f"{episode.name} has neither images nor a state: export it to csv.")
-    return spaces.Dict(found) if len(found) > 1 else next(iter(found.values())), picture
+    return spaces.Dict(found) if len(found) > 1 else next(iter(found.values()))
 
 
-def _write_episode(group: Any, episode: ExchangeEpisode, picture: spaces.Box | None) -> list[Step]:
+def _write_episode(group: Any, episode: ExchangeEpisode, grey: bool) -> list[Step]:
     """Write the columns of an episode to its group, and return its steps.
 
     The last observation is repeated. An episode without an end is truncated at its last step, so
@@ -432,8 +430,9 @@ def _write_episode(group: Any, episode: ExchangeEpisode, picture: spaces.Box | N
     """
     h5py, header = library("h5py"), episode.header
     steps, rests, frames = list[Step](), list[str](), list[int]()
-    both = picture is not None and bool(header.state_layout)
-    state_at, picture_at = (_OBSERVATIONS + at * both for at in ("/state", "/image"))
+    has_images = header.image_size is not None
+    both = has_images and bool(header.state_layout)
+    state_at, image_at = (_OBSERVATIONS + at * both for at in ("/state", "/image"))
 
     def column(name: str, dtype: Any, values: Sequence[Any] = (), shape: Sequence[int] = ()) -> Any:
         now, most = (len(values), *shape), (None, *shape)
@@ -442,31 +441,21 @@ def _write_episode(group: Any, episode: ExchangeEpisode, picture: spaces.Box | N
             made[:] = values
         return made
 
-    def append(at: Any, value: Any) -> None:
-        at.resize(len(at) + 1, axis=0)
-        at[-1] = value
-
-    size, grey, frame, shown = None, False, -1, np.empty(0)
-    observed: list[Any] = []  # The columns of the images; the last one is Minari's.
-    if picture is not None:
-        size, grey = (picture.shape[1], picture.shape[0]), len(picture.shape) == 2
-        as_jpeg = library(_STORAGE).is_image_space(picture)
-        observed = [column(picture_at if as_jpeg else _JPEG, h5py.vlen_dtype(np.uint8))]
-        observed += [] if as_jpeg else [column(picture_at, np.uint8, shape=picture.shape)]
-    for row, jpeg, pixels in decoded_steps(episode.rows, size, episode.name, "Minari"):
+    images = column(image_at, h5py.vlen_dtype(np.uint8)) if has_images else None
+    jpeg, frame = b"", -1
+    for record, pixels in decoded_images(episode, "Minari"):
         if pixels is not None:
-            frame, shown = frame + 1, pixels[..., 0] if grey else pixels
+            frame, jpeg = frame + 1, record.jpeg or b""
             where = f"of step {len(steps)} of {episode.name}"
             if is_grey(jpeg, where) != grey:
-                kinds = (
-                    "not grey, and the first one is" if grey else "grey, and the first one is not"
-                )
-                raise DemosError(f"The image {where} is {kinds}: Minari needs images of one kind.")
-        for at, value in zip(observed, (np.frombuffer(jpeg, np.uint8), shown), strict=False):
-            append(at, value)
-        steps.append(row.step)
-        rest = {n: v for n, v in row.step.to_json().items() if n not in _IN_COLUMNS}
-        rests.append(json.dumps({"step": rest, "marks": row.marks, "dropped": row.dropped}))
+                kinds = "is grey, and the first one is not", "is not grey, and the first one is"
+                raise DemosError(f"The image {where} {kinds[grey]}: Minari needs one kind.")
+        if images is not None:
+            images.resize(len(images) + 1, axis=0)
+            images[-1] = np.frombuffer(jpeg, np.uint8)
+        steps.append(record.step)
+        rest = {n: v for n, v in record.step.to_json().items() if n not in _IN_COLUMNS}
+        rests.append(json.dumps({"step": rest, "marks": record.marks, "dropped": record.dropped}))
         frames.append(frame)
     last = steps[-1]
     cut = [*(step.truncated for step in steps[:-1]), last.truncated or not last.terminated]
@@ -479,8 +468,9 @@ def _write_episode(group: Any, episode: ExchangeEpisode, picture: spaces.Box | N
     if header.state_layout:
         states = [step.state for step in (*steps, last)]
         column(state_at, np.float64, states, (header.states.size,))
-    if picture is not None:
-        append(observed[-1], observed[-1][-1])
+    if images is not None:
+        images.resize(len(images) + 1, axis=0)
+        images[-1] = images[-2]
         column(_FRAME, np.int64, frames)
     return steps
 
@@ -490,8 +480,9 @@ FORMAT: Final = Format(
     title="Minari",
     sign=f"{_DATA}/{_METADATA}",
     detect=lambda folder: _data_folder(folder) is not None,
-    read=_read,
+    read=lambda folder, context: _Dataset(folder, context).read(),
     write=_write,
     options=frozenset({"hz", "dropped"}),
+    alike=("actions", "states", "image_size", "control_hz"),
     consecutive=True,
 )

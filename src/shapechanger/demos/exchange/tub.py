@@ -1,17 +1,16 @@
-"""Donkeycar tubs: import of versions 1 and 2, export of version 2.
+"""Donkeycar tubs of version 2.
 
 `user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, as in
 Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is the action of a policy.
 In the other modes `pilot/...` drives, except for the person's throttle in "local_angle".
 
-Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
-metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted
-indexes are values of the records' `_index`; `_timestamp_ms` is Unix time, and `_session_id` names
-the start of the car. Version 1 has a file `record_N.json` per record, its image next to it,
-optionally `milliseconds` since the start, `meta.json`, and the deleted numbers in `exclude.json`.
+A tub is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more metadata,
+and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted indexes
+are values of the records' `_index`; `_timestamp_ms` is Unix time, and `_session_id` names the start
+of the car.
 
-Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py for version 2,
-parts/datastore.py for version 1, at the commits 1e831b81, 38a1c2db and b253cef6.
+Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py at the commits
+1e831b81, 38a1c2db and b253cef6.
 """
 
 from __future__ import annotations
@@ -22,17 +21,17 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Final
 
 import msgspec
-from msgspec import Meta, Struct, field
-from msgspec.structs import replace
+from msgspec import Meta, Struct, field, structs
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files, pictures
+from shapechanger.demos.exchange import files
 from shapechanger.demos.exchange.format import (
     COLUMNS,
     COMMANDS,
@@ -40,22 +39,19 @@ from shapechanger.demos.exchange.format import (
     ExportContext,
     Format,
     ImportContext,
-    SourceRecord,
+    Record,
     as_json,
     choose_camera,
-    counted,
+    drives,
     features_of,
     few,
-    kept_steps,
-    stretches,
 )
-from shapechanger.errors import DemosError, translate_errors
+from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
 _MANIFEST: Final = "manifest.json"
 _IMAGES: Final = "images"
 _LOOP_HZ: Final = "DRIVE_LOOP_HZ"  # Donkeycar's name of the rate.
-_RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 _IMAGE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
 _ACTIONS: Final = Layout((COMMANDS["steering"], COMMANDS["throttle"]))
 _USER, _PILOT = ([f"{who}/{axis}" for axis in ("angle", "throttle")] for who in ("user", "pilot"))
@@ -93,43 +89,18 @@ class _Catalogs(Struct):
     current_index: int = 0
 
 
-class _Tub(Struct):
-    """A tub; the first four fields are in the `meta.json` of version 1."""
-
-    inputs: list[str] = []
-    types: list[str] = []
-    start: float | None = None  # Unix time, s.
-    rate: Any = field(default=None, name=_LOOP_HZ)
-    records: list[Fields] = []  # Each has a unique number as `_index`.
-    deleted: list[int] = []
-    is_unix: bool = True  # Otherwise times begin at 0 with each start of the car.
+def _is_tub(folder: Path) -> bool:
+    return (folder / _MANIFEST).is_file() or any(folder.glob("record_*.json"))
 
 
-def _is_v2(folder: Path) -> bool:
-    return (folder / _MANIFEST).is_file()
-
-
-def _numbered(folder: Path) -> list[tuple[int, str]]:
-    """Return the numbers and files of the records of version 1."""
-    with translate_errors(OSError, to=lambda error: files.cannot_read(folder, error)):
-        names = [child.name for child in folder.iterdir()]
-    return sorted((int(m[1]), m[0]) for m in map(_RECORD_NAME.fullmatch, names) if m)
-
-
-def _read_v2(folder: Path, context: ImportContext) -> _Tub:
-    path = folder / _MANIFEST
-    lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
-    kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
-    decoded = [files.parse_json(line, path, kind) for line, kind in zip(lines, kinds, strict=True)]
-    catalogs: _Catalogs = decoded[4]
-    if len(set(catalogs.paths)) < len(catalogs.paths):
-        context.warn(f"{path} names a catalog twice in its paths: it is read once.")
+def _catalogued(folder: Path, catalogs: _Catalogs, context: ImportContext) -> dict[int, Fields]:
+    """Return the fields of the records in the catalogs, by their `_index`, in its order."""
     found: dict[int, list[Fields]] = {}
-    for name in dict.fromkeys(catalogs.paths):
+    for name in catalogs.paths:
         try:
-            lines = files.read_bytes(files.inside(folder, name, path)).split(b"\n")
+            lines = files.read_bytes(files.inside(folder, name, folder / _MANIFEST)).split(b"\n")
         except DemosError as error:
-            context.leave_out("catalog", pictures.unreadable(error), name)
+            context.report("left out", str(error).removesuffix("."), name)
             continue
         for number, line in enumerate(lines, 1):
             try:
@@ -137,106 +108,80 @@ def _read_v2(folder: Path, context: ImportContext) -> _Tub:
                     fields: Fields = files.parse_json(line, name, Fields)
                     found.setdefault(msgspec.convert(fields["_index"], int), []).append(fields)
             except (DemosError, LookupError, msgspec.ValidationError):
-                reason = "with damaged JSON or without a valid _index"
-                context.leave_out("line", reason, f"{name}, line {number}")
+                reason = "damaged JSON, or no valid _index"
+                context.report("left out", reason, f"{name}, line {number}")
     numbers = sorted(found)
     if numbers != list(found):
-        context.warn("The _index does not always rise: the records are read in its order.")
+        text = "The _index does not always rise: the records are read in its order."
+        context.report("warning", text)
     last = max([*numbers, catalogs.current_index - 1])
     if (missing := last + 1 - len(numbers)) > 0:
-        context.note(f"{missing} of the records 0 to {last} are in no catalog.")
+        context.report("note", f"{missing} of the records 0 to {last} are in no catalog.")
     if strange := [number for number in catalogs.deleted_indexes if number > last]:
-        context.warn(f"{len(strange)} of the deleted indexes belong to no record: {few(strange)}.")
-    for number, same in found.items():
-        for _ in same if len(same) > 1 else ():
-            context.leave_out("record", "with the _index of another record", number)
-    return _Tub(
-        inputs=decoded[0],
-        types=decoded[1],
-        rate=dict(decoded[2]).get(_LOOP_HZ),
-        records=[found[number][0] for number in numbers if len(found[number]) == 1],
-        deleted=catalogs.deleted_indexes,
-    )
-
-
-def _read_v1(folder: Path, context: ImportContext) -> _Tub:
-    """Read a file for each record; without Unix times, each start of the car is a session."""
-    path, exclude = folder / "meta.json", folder / "exclude.json"
-    tub = files.parse_json(files.read_bytes(path), path, _Tub) if path.is_file() else _Tub()
-    gone: list[int] = []
-    if exclude.is_file():
-        gone = files.parse_json(files.read_bytes(exclude), exclude, list[int])
-    tub.deleted, tub.records, tub.is_unix = gone, [], tub.start is not None
-    starts, before_ms = 1, 0.0
-    for number, name in _numbered(folder):
-        text = files.read_bytes(files.inside(folder, name, folder))
-        try:
-            fields: Fields = files.parse_json(text, name, Fields)
-        except DemosError:
-            if number not in tub.deleted:
-                context.leave_out("record", "with damaged JSON", number)
-            continue
-        time_ms = fields.pop("milliseconds", None)
-        if type(time_ms) in {int, float} and abs(time_ms) < _MAX_MS:
-            starts, before_ms = starts + (time_ms < before_ms), time_ms
-            time_ms += 1e3 * (tub.start or 0.0)
-        session = "" if tub.is_unix else f"start {starts}"
-        more = {"_index": number, "_timestamp_ms": time_ms, "_session_id": session}
-        tub.records.append(fields | more)
-    return tub
+        text = f"{len(strange)} of the deleted indexes belong to no record: {few(strange)}."
+        context.report("warning", text)
+    for number in numbers:
+        if len(found[number]) > 1:
+            context.report("left out", "the _index of several records", f"record {number}")
+    return {number: found[number][0] for number in numbers if len(found[number]) == 1}
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a tub: its sessions, divided at pauses and where time jumps."""
-    tub = (_read_v2 if _is_v2(folder) else _read_v1)(folder, context)
-    if len(tub.inputs) != len(tub.types):
-        raise DemosError(f"{folder} has {len(tub.inputs)} inputs, but {len(tub.types)} types.")
-    types, deleted = dict(zip(tub.inputs, tub.types, strict=True)), set(tub.deleted)
-    kept = [fields for fields in tub.records if fields["_index"] not in deleted]
-    if gone := len(tub.records) - len(kept):
-        context.note(f"{counted(gone, 'record')} deleted in the tub, and not imported.")
-    there = list(dict.fromkeys(name for fields in kept for name in fields))
+    path = folder / _MANIFEST
+    if not path.is_file():
+        raise DemosError(
+            f"{folder} is a tub of version 1: Donkeycar's convert_to_tub_v2 converts it."
+        )
+    lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
+    kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
+    inputs, kinds_of_inputs, metadata, _, catalogs = (
+        files.parse_json(line, path, kind) for line, kind in zip(lines, kinds, strict=True)
+    )
+    if len(inputs) != len(kinds_of_inputs):
+        raise DemosError(f"{path} has {len(inputs)} inputs, but {len(kinds_of_inputs)} types.")
+    if len(set(catalogs.paths)) < len(catalogs.paths):
+        raise DemosError(f"{path} names a catalog twice in its paths.")
+    types, deleted = dict(zip(inputs, kinds_of_inputs, strict=True)), {*catalogs.deleted_indexes}
+    found = _catalogued(folder, catalogs, context)
+    kept = {number: fields for number, fields in found.items() if number not in deleted}
+    if gone := len(found) - len(kept):
+        context.report("note", f"Records that are deleted in the tub are not imported: {gone}.")
+    there = list(dict.fromkeys(name for fields in kept.values() for name in fields))
     cameras = [name for name in there if types.get(name) in _PICTURES or name == _IMAGE]
     camera = _IMAGE if _IMAGE in cameras and not context.camera else ""
     camera = camera or choose_camera(folder, cameras, context)
     if not camera and _DEPTH in map(types.get, there):
-        context.warn("The steps have no images, because those of 16 bits are not imported.")
+        text = "The steps have no images, because those of 16 bits are not imported."
+        context.report("warning", text)
     numeric = [name for name, kind in types.items() if name and kind in _NUMBERS]
     sensed = [name for name in numeric if not name.startswith(("user/", "pilot/", "_"))]
     taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
     if left := [n for n in there if n not in taken and not n.startswith("_")]:
-        context.note(f"Columns that are not imported: {', '.join(left)}.")
-    records = [_record(fields, sensed, camera) for fields in kept]
+        context.report("note", f"Columns that are not imported: {', '.join(left)}.")
+    records = [_record(number, fields, sensed, camera) for number, fields in kept.items()]
     if camera:
-        _find_pictures(records, folder / _IMAGES if _is_v2(folder) else folder, context)
-    records, size = pictures.with_pictures(records, "record", context)
-    sessions = {fields["_index"]: str(fields.get("_session_id", "")) for fields in kept}
+        _find_pictures(records, folder / _IMAGES, context)
+    sessions = {number: str(fields.get("_session_id", "")) for number, fields in kept.items()}
     parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
-    states = [feature for name in sensed for feature in features_of(name, 1)]
-    rate = _float(tub.rate)
+    header = EpisodeHeader(
+        action_layout=_ACTIONS.to_json(),
+        state_layout=as_json([feature for name in sensed for feature in features_of(name, 1)]),
+        body="car",
+        source="tub",
+    )
+    rate = _float(dict(metadata).get(_LOOP_HZ))
     stated_hz = rate if 0.0 < rate < math.inf else None
-    for part, hz, timed in stretches(parts, "record", context, stated_hz):
-        created = ""
-        if tub.is_unix and timed:
+    for part, head in drives(parts, header, context, stated_hz):
+        if head.clock == "real":
             for record in part:
-                record.step = replace(record.step, wall_ns=record.step.captured_ns)
+                record.step = structs.replace(record.step, wall_ns=record.step.captured_ns)
             at = datetime.fromtimestamp((part[0].step.wall_ns or 0) / _NS_PER_S, UTC)
-            created = at.isoformat(timespec="milliseconds")
-        session = sessions[part[0].number]
-        header = EpisodeHeader(
-            action_layout=_ACTIONS.to_json(),
-            state_layout=as_json(states),
-            image_size=size,
-            control_hz=hz,
-            body="car",
-            clock="real" if timed else "none",
-            source="tub",
-            notes={"session": session} if session else {},
-            created=created,
-        )
-        name = f"{folder}, from record {part[0].name}"
-        rows = pictures.rows_of(part, size, context, "record")
-        yield ExchangeEpisode(header=header, rows=rows, name=name)
+            head = replace(head, created=at.isoformat(timespec="milliseconds"))
+        if session := sessions[part[0].number]:
+            head = replace(head, notes={"session": session})
+        name = f"{folder}, from {part[0].name}"
+        yield ExchangeEpisode(header=head, records=part, name=name)
 
 
 def _float(value: Any) -> float:
@@ -246,13 +191,13 @@ def _float(value: Any) -> float:
     return math.nan
 
 
-def _record(fields: Fields, sensed: Sequence[str], camera: str) -> SourceRecord:
+def _record(number: int, fields: Fields, sensed: Sequence[str], camera: str) -> Record:
     """Return a record; it has a fault if it has no valid action."""
     known, fault = _Record(), ""
     try:
         known = msgspec.convert(fields, _Record)
     except msgspec.ValidationError as error:
-        fault = f"with an invalid value ({error})"
+        fault = f"an invalid value ({error})"
     pilot = (known.pilot_angle, known.pilot_throttle)
     action = {
         "user": (known.user_angle, known.user_throttle),
@@ -260,7 +205,7 @@ def _record(fields: Fields, sensed: Sequence[str], camera: str) -> SourceRecord:
     }.get(known.mode, pilot)
     by_person = known.mode == "user"
     if None in action:
-        fault = fault or f"without an action in the mode {known.mode!r}"
+        fault = fault or f"no action in the mode {known.mode!r}"
     step = Step(
         action=(action[0] or 0.0, action[1] or 0.0),
         driver="person" if by_person else "policy",
@@ -268,34 +213,29 @@ def _record(fields: Fields, sensed: Sequence[str], camera: str) -> SourceRecord:
         state=tuple(_float(fields.get(name)) for name in sensed),
         captured_ns=None if known.time_ms is None else round(known.time_ms * _NS_PER_MS),
     )
-    number = fields["_index"]
     frame = fields.get(camera)
-    return SourceRecord(name=str(number), number=number, step=step, frame=frame, fault=fault)
+    return Record(name=f"record {number}", number=number, step=step, frame=frame, fault=fault)
 
 
-def _find_pictures(records: Sequence[SourceRecord], images: Path, context: ImportContext) -> None:
+def _find_pictures(records: Sequence[Record], images: Path, context: ImportContext) -> None:
     """Find the image of each record by its name, the `frame`; others get a fault."""
     shown = Counter(str(record.frame) for record in records if not record.fault)
-    others: list[int] = []
     for record in records:
         name = record.frame
         if record.fault:
             continue
         if not name or not isinstance(name, str):
-            record.fault = "without an image"
+            record.fault = "no image"
             continue
-        # Version 1 writes whole paths of the robot for the type "image".
+        # The type "image" may have the whole path on the robot.
         place = PurePath(name).name if PurePath(name).is_absolute() else name
-        record.picture = images / place
+        record.image = images / place
         if not files.is_inside(images, place):
-            record.fault = "with an image name that leaves the folder"
-        elif shown[name] > 1 and record.picture.is_file():
-            record.fault = "with the image of another record"
+            record.fault = "an image name that leaves the folder"
+        elif shown[name] > 1 and record.image.is_file():
+            record.fault = "the image of several records"
         elif (match := _IMAGE_NUMBER.match(name)) and int(match[1]) != record.number:
-            others.append(record.number)
-    if others:
-        what = counted(len(others), "record")
-        context.warn(f"{what} with the image of another number: {few(others)}.")
+            context.report("warning", "the image of another number", record.name)
 
 
 def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
@@ -304,10 +244,13 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
     Actions of people, experts and programs are written as `user/...`, those of policies as
     `pilot/...`.
     """
-    states = {_state_names(episode) for episode in episodes}
-    if len(states) > 1:
-        raise DemosError("The episodes have different states: export each kind to its own tub.")
-    (state,) = states
+    action, states = episodes[0].header.actions, episodes[0].header.states
+    if action.names != _ACTIONS.names or states.size != len(states):
+        raise DemosError(
+            f"{episodes[0].name} has the action {', '.join(action.names)}, or a state with arrays, "
+            f"but a tub {', '.join(_ACTIONS.names)} and single numbers: export it to minari or csv."
+        )
+    state = states.names
     (folder / _IMAGES).mkdir()
     records: list[Fields] = []
     began = [_began(episode.header) for episode in episodes]
@@ -343,16 +286,6 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
     return len(records)
 
 
-def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
-    action, state = episode.header.actions, episode.header.states
-    if action.names != _ACTIONS.names or state.size != len(state):
-        raise DemosError(
-            f"{episode.name} has the action {', '.join(action.names)}, or a state with arrays, but "
-            f"a tub {', '.join(_ACTIONS.names)} and single numbers: export it to minari or csv."
-        )
-    return state.names
-
-
 def _fields(step: Step, state: Sequence[str], where: str) -> Fields:
     by_policy = step.driver == "policy"
     if any(abs(value) > 1.0 for value in step.action):
@@ -376,7 +309,8 @@ def _timed(episode: ExchangeEpisode, began_ns: int) -> Iterator[tuple[Step, byte
     is_simulated = header.clock == "twin" or (header.clock == "none" and header.env)
     first_ns: int | None = None
     last_ns: int | None = None
-    for step, jpeg in kept_steps(episode.rows):
+    for record in episode.records:
+        step = record.step
         at_ns, clock_ns = step.wall_ns, step.clock_ns
         first_ns = clock_ns if first_ns is None else first_ns
         if is_simulated:
@@ -384,7 +318,7 @@ def _timed(episode: ExchangeEpisode, began_ns: int) -> Iterator[tuple[Step, byte
         if at_ns is None or (last_ns is not None and at_ns <= last_ns):
             at_ns = began_ns if last_ns is None else last_ns + round(_NS_PER_S / header.control_hz)
         last_ns = at_ns
-        yield step, jpeg, at_ns
+        yield step, record.jpeg, at_ns
 
 
 def _began(header: EpisodeHeader) -> datetime:
@@ -396,9 +330,10 @@ def _began(header: EpisodeHeader) -> datetime:
 FORMAT: Final = Format(
     name="tub",
     title="Donkeycar",
-    sign=f"{_MANIFEST} or record_0.json",
-    detect=lambda folder: _is_v2(folder) or bool(_numbered(folder)),
+    sign=_MANIFEST,
+    detect=_is_tub,
     read=_read,
     write=_write,
     options=frozenset({"camera", "hz"}),
+    alike=("actions", "states"),
 )

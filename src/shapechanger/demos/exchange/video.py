@@ -1,190 +1,28 @@
-"""Read images and videos of datasets, check them, and convert them to JPEG; write videos.
+"""Write and read videos of datasets.
 
-Videos are written and read through PyAV. An untrusted video is opened as a file object and as MP4
-only, so that it cannot refer to other files. Its images are decoded up to a limit of pixels, and
-damaged images are refused instead of being concealed.
+An untrusted video is opened as a file object and as MP4 only, so that it cannot refer to other
+files. Its images are decoded up to a limit of pixels, and damaged images are refused instead of
+being concealed.
 """
 
 from __future__ import annotations
 
-import io
 import re
-from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import DRIVERS, Step
-from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES
 from shapechanger.demos.exchange.files import MAX_UNPACKED, library
-from shapechanger.demos.exchange.format import ExchangeStep, ImportContext, SourceRecord, counted
-from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
-from shapechanger.errors import (
-    DemosError,
-    MissingExtra,
-    OutputError,
-    ShapechangerError,
-    UnknownName,
-    translate_errors,
-)
-from shapechanger.files import read_file
+from shapechanger.demos.jpeg import MAX_PIXELS
+from shapechanger.errors import DemosError, OutputError, translate_errors
 
-_JPEG: Final = b"\xff\xd8"
-_PNG: Final = b"\x89PNG"
-_PNG_DEPTH: Final = slice(24, 25)  # Position of the number of bits of a value.
-_OPAQUE: Final = 255
 _MAX_SAMPLES: Final = 1 << 21  # Of a video: 10 hours at 60 Hz, and 50 MB of FFmpeg's index.
-
-
-class PictureError(DemosError):
-    """An image cannot be imported; the message follows a noun, such as "with an empty image"."""
-
-
-def load_jpeg(
-    picture: Path | bytes | NDArray[np.uint8] | None, size: tuple[int, int] | None = None
-) -> tuple[bytes, tuple[int, int], bool]:
-    """Return an intact image as JPEG, its width and height, and whether it was encoded.
-
-    Images are encoded with quality 100.
-
-    Args:
-        picture: A file, or the content of one: JPEG, PNG or BMP; or pixels, shape
-            (height, width, 3).
-        size: Width and height that it must have, pixels; None for any.
-
-    Raises:
-        PictureError: If it is missing, damaged, of another kind or size, or too large.
-    """
-    data = b""
-    if isinstance(picture, np.ndarray):
-        pixels = picture
-    else:
-        reason = "with an image that cannot be read ({})"
-        with translate_errors(
-            OSError, to=lambda error: PictureError(reason.format(error.strerror or error))
-        ):
-            read = isinstance(picture, Path)
-            data = read_file(picture, MAX_PICTURE_BYTES) if read else picture or b""
-        if not data.strip(b"\0"):
-            raise PictureError("with an empty image")
-        if len(data) > MAX_PICTURE_BYTES:
-            raise PictureError(f"with an image of more than {MAX_PICTURE_BYTES} bytes")
-        try:
-            pixels = decode_picture(data, "") if data.startswith(_JPEG) else _pixels(data)
-        except (PictureError, MissingExtra):
-            raise
-        except Exception as error:  # Pillow's errors have no common base.
-            raise PictureError("with a damaged image") from error
-    found, is_jpeg = (pixels.shape[1], pixels.shape[0]), data.startswith(_JPEG)
-    if size is not None and found != size:
-        raise PictureError(other_size(found, size))
-    return data if is_jpeg else encode_picture(pixels), found, not is_jpeg
-
-
-def other_size(found: Sequence[int], size: Sequence[int]) -> str:
-    """Return the reason to leave out an image of another size, each in pixels."""
-    return "with an image of {} x {} pixels, and not {} x {}".format(*found, *size)
-
-
-def _pixels(data: bytes) -> NDArray[np.uint8]:
-    """Decode a PNG or BMP of 8 bits, shape (height, width, 3)."""
-    if not data.startswith((_PNG, b"BM")):
-        raise PictureError("with an image that is not JPEG, PNG or BMP")
-    if data.startswith(_PNG) and data[_PNG_DEPTH] == b"\x10":
-        raise PictureError("with an image of more than 8 bits a value, like that of a depth camera")
-    with library("PIL.Image").open(io.BytesIO(data), formats=["PNG", "BMP"]) as opened:
-        if opened.width * opened.height > MAX_PIXELS:
-            raise PictureError(f"with an image of more than {MAX_PIXELS} pixels")
-        alpha = opened.convert("RGBA") if opened.has_transparency_data else None
-        if alpha is not None and np.asarray(alpha)[..., 3].min() < _OPAQUE:
-            raise PictureError("with an image that is partly transparent")
-        return np.asarray(opened.convert("RGB"))
-
-
-def rows_of(
-    records: Iterable[SourceRecord],
-    size: tuple[int, int] | None,
-    context: ImportContext,
-    what: str,
-    rest: Sequence[str] = (),
-) -> Iterator[ExchangeStep]:
-    """Yield the steps of the records that are whole; the others are reported.
-
-    Args:
-        records: The records of an episode in order.
-        size: Width and height of the images, pixels; None to leave out images.
-        context: Collects what is left out.
-        what: A record, as a noun for reports.
-        rest: Names of all records, of which those are reported that a damaged file does not have.
-    """
-    shown: object = None
-    done = 0
-    try:
-        for done, record in enumerate(records, 1):  # noqa: B007
-            frame = record.picture if record.frame is None else record.frame
-            jpeg, fault = None, record.fault or _fault(record.step)
-            if size is not None and record.picture is not None and frame != shown and not fault:
-                try:
-                    jpeg, *_ = load_jpeg(record.picture, size)
-                except PictureError as error:
-                    fault = str(error)
-            if fault:
-                context.leave_out(what, fault, record.name)
-                continue
-            shown = shown if jpeg is None else frame
-            yield ExchangeStep(
-                step=record.step, jpeg=jpeg, marks=record.marks, dropped=record.dropped
-            )
-    except DemosError as error:
-        for name in rest[done:]:
-            context.leave_out(what, unreadable(error), name)
-
-
-def unreadable(error: ShapechangerError) -> str:
-    """Return a reason to leave a part out, after a noun."""
-    return f"that cannot be read ({str(error).removesuffix('.')})"
-
-
-def _fault(step: Step) -> str:
-    if not all(map(isfinite, step.action)):
-        return "with an action that is not finite"
-    if step.driver not in DRIVERS:
-        return unreadable(UnknownName("driver", step.driver, DRIVERS))
-    return ""
-
-
-def with_pictures(
-    records: Sequence[SourceRecord], what: str, context: ImportContext
-) -> tuple[list[SourceRecord], tuple[int, int] | None]:
-    """Return the records with a whole image, or with none, and the most frequent size.
-
-    All images are decoded, so that rates and jumps follow from the records that remain.
-    """
-    sizes: dict[int, tuple[int, int]] = {}
-    encoded = 0
-    for place, record in enumerate(records):
-        if record.picture is not None and not record.fault:
-            try:
-                _, sizes[place], is_new = load_jpeg(record.picture)
-                encoded += is_new
-            except PictureError as error:
-                record.fault = str(error)
-    common = Counter(sizes.values()).most_common(1)[0][0] if sizes else None
-    for place, record in enumerate(records):
-        if common is not None and (size := sizes.get(place, common)) != common:
-            record.fault = other_size(size, common)
-        if record.fault:
-            context.leave_out(what, record.fault, record.name)
-    if encoded:
-        context.note(f"{counted(encoded, 'image')} encoded as JPEG of quality 100.")
-    return [record for record in records if not record.fault], common
 
 
 class VideoWriter:
