@@ -17,8 +17,7 @@ from shapechanger.errors import DemosError, MissingExtra
 from shapechanger.layout import Layout
 
 MAX_PIXELS: Final = 1 << 24
-"""Limit of decoded pixels, about sixteen million. The header of a JPEG of a few hundred bytes can
-claim four thousand million."""
+"""Limit of decoded pixels. The header of a JPEG of a few hundred bytes can claim 4 * 10**9."""
 
 _SCAN: Final = b"\xff\xda"  # Start of a scan (ITU-T T.81); in the scans 0xff is followed by 0.
 _MAX_SCANS: Final = 64  # Progressive JPEGs have about ten.
@@ -67,16 +66,11 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
         name: How to name the image in errors.
     """
     if jpeg.count(_SCAN) > _MAX_SCANS:
-        raise DemosError(
-            f"The image {name} has more than {_MAX_SCANS} scans, each of which takes the time of "
-            f"a picture: {_REMEDY}."
-        )
+        raise DemosError(f"The image {name} has more than {_MAX_SCANS} scans: {_REMEDY}.")
     height, width, *_ = _decoded("decode_jpeg_header", jpeg, name)
     if height * width > MAX_PIXELS:
-        raise DemosError(
-            f"The image {name} claims {width} x {height} pixels, more than the limit of "
-            f"{MAX_PIXELS}: {_REMEDY}."
-        )
+        claimed = f"{width} x {height} pixels, more than {MAX_PIXELS}"
+        raise DemosError(f"The image {name} claims {claimed}: {_REMEDY}.")
     return width, height
 
 
@@ -135,13 +129,11 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
     large = picture.repeat(times, axis=0).repeat(times, axis=1)
     width = large.shape[1] - large.shape[1] % 2
     large = large[: large.shape[0] - large.shape[0] % 2, :width]
-    # The ends of the bars; for an unbounded value its magnitude, at least 1.
-    reach = np.maximum(1.0, np.abs(step.action))
+    reach = np.maximum(1.0, np.abs(step.action))  # Ends of the bars of unbounded values.
     lows = np.where(np.isfinite(layout.low), layout.low, -reach)
     highs = np.where(np.isfinite(layout.high), layout.high, reach)
 
-    def columns(values: Sequence[float]) -> list[int]:
-        """Return the column of each value, from 0 to the last one."""
+    def columns(values: Sequence[float]) -> list[int]:  # From 0 to the last one.
         shares = np.full(len(lows), 0.5)
         above = np.clip(np.nan_to_num(values), lows, highs) - lows
         np.divide(above, highs - lows, out=shares, where=lows < highs)

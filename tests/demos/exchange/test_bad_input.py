@@ -285,7 +285,7 @@ def test_episodes_of_two_kinds(tmp_path: Path, changes: dict[str, object], expec
     [
         (huge(), "claims 60000 x 60000"),
         (picture(1, 48, 32), "48 x 32 pixels, and not 40 x 32"),
-        (picture(1, grey=True), "is grey, and the first one is not"),
+        (picture(1, grey=True), "grey or coloured images, and not both of step 1"),
     ],
 )
 def test_frames_that_minari_cannot_read(tmp_path: Path, jpeg: bytes, expected: str) -> None:

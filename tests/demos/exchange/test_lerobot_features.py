@@ -172,9 +172,9 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
         ({"info": {"codebase_version": "v2.1"}}, "version v2.1.*convert_dataset_v21"),
         ({"info": {"fps": 0}}, r"Expected `float` > 0.0 - at `\$.fps`"),
         ({"info": {"data_path": "../../{chunk_index}"}}, "leaves the folder"),
-        ({"info": {"data_path": "{chunk_index:99d}"}}, "There is no .*99d"),
+        ({"info": {"data_path": "{chunk_index:99d}"}}, "0 files of .*99d. have its rows"),
         ({"info": {"data_path": None}}, "Expected `str`, got `null`.*data_path"),
-        ({"info": {"data_path": "**/*"}}, r"There is no .*\*"),
+        ({"info": {"data_path": "**/*"}}, r"0 files of \*\*/\* have its rows"),
         ({"info": {"video_path": "/etc/{video_key}"}}, "episode 0.*leaves the folder"),
         (
             {"features": {"action": {"dtype": "string", "shape": [1]}}},

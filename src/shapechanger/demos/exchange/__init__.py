@@ -144,7 +144,7 @@ def export_recording(
     else:
         episodes = [_exchanged(episode, steps, episode.outcome) for episode, steps in chosen]
     for episode in episodes:
-        for name in form.alike:
+        for name in form.common:
             if getattr(episode.header, name) != getattr(episodes[0].header, name):
                 raise DemosError(
                     f"{episode.name} differs from {episodes[0].name} in its {name}, but a "

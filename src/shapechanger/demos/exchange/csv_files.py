@@ -60,10 +60,7 @@ def _tables_of(folder: Path) -> list[Path]:
     """Return the folders with a `steps.csv`: the folder itself, or its subfolders."""
     if (folder / _TABLE).is_file():
         return [folder]
-    try:
-        return sorted(path for path in folder.iterdir() if (path / _TABLE).is_file())
-    except OSError as error:
-        raise files.cannot_read(folder, error) from error
+    return sorted(path.parent for path in folder.glob(f"*/{_TABLE}") if path.is_file())
 
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:

@@ -14,8 +14,9 @@ import os
 import secrets
 import shutil
 from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib import import_module
+from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -23,7 +24,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import EpisodeHeader
+from shapechanger.demos.episodes import Driver, EpisodeHeader
 from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES, MAX_TEXT_BYTES
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
 from shapechanger.errors import (
@@ -41,10 +42,10 @@ MAX_UNPACKED: Final = 64 << 20
 MAX_VALUES: Final = 1 << 17
 """Largest number of values of a feature."""
 
+_MOST_STEPS: Final = 1 << 20
 _JPEG: Final = b"\xff\xd8"
 _PNG: Final = b"\x89PNG"
 _PNG_DEPTH: Final = slice(24, 25)  # Position of the number of bits of a value.
-_OPAQUE: Final = 255
 
 
 def library(name: str, extra: str = "data") -> Any:
@@ -70,7 +71,6 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
         raise DemosError(f"{out} exists already: choose another name, or move it away.")
     if source is not None and out.resolve().is_relative_to(source.resolve()):
         raise DemosError(f"{out} lies in {source}, which is never changed: choose another place.")
-    made = [parent for parent in out.absolute().parents if not parent.exists()]
     part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
     try:
         with writing(out):
@@ -80,9 +80,6 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
             part.rename(out)
     except BaseException as error:
         shutil.rmtree(part, ignore_errors=True)
-        with suppress(OSError):  # A folder that is not empty stays.
-            for parent in made:
-                parent.rmdir()
         if isinstance(error, DemosError | OutputError) and str(part) in str(error):
             # Name the folder that the user asked for.
             raise type(error)(str(error).replace(str(part), str(out))) from error
@@ -114,8 +111,10 @@ def inside(folder: Path, name: str, named_by: object) -> Path:
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a regular file."""
-    with translate_errors(OSError, to=lambda error: cannot_read(path, error)):
+    try:
         return read_file(path, MAX_TEXT_BYTES)
+    except OSError as error:
+        raise DemosError(f"{path} cannot be read: {error.strerror}.") from error
 
 
 def read_text(path: Path) -> str:
@@ -123,9 +122,7 @@ def read_text(path: Path) -> str:
     try:
         return read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise DemosError(
-            f"{path} is not text in UTF-8 (byte {error.start}): save it as UTF-8."
-        ) from error
+        raise DemosError(f"{path} is not text in UTF-8 (byte {error.start}).") from error
 
 
 def read_table(path: Path) -> list[tuple[int, list[str]]]:
@@ -143,13 +140,10 @@ def read_table(path: Path) -> list[tuple[int, list[str]]]:
 def load_jpeg(
     image: Path | bytes | NDArray[np.uint8], decoded: tuple[int, int] | None = None
 ) -> tuple[bytes, tuple[int, int]]:
-    """Return an intact image as JPEG of its pixels or as it is, with its width and height.
-
-    Other images than JPEGs are encoded with quality 100.
+    """Return an intact image as JPEG, with its width and height; others get quality 100.
 
     Args:
-        image: A file, or the content of one: JPEG, PNG or BMP; or pixels, shape
-            (height, width, 3).
+        image: A file or its content, as JPEG, PNG or BMP; or pixels, shape (height, width, 3).
         decoded: Its size if it was decoded before, so that a JPEG is not decoded again.
 
     Raises:
@@ -190,17 +184,8 @@ def _pixels(data: bytes) -> NDArray[np.uint8] | None:
     with library("PIL.Image").open(io.BytesIO(data), formats=["PNG", "BMP"]) as opened:
         if opened.width * opened.height > MAX_PIXELS:
             return None
-        alpha = opened.convert("RGBA") if opened.has_transparency_data else None
-        if alpha is not None and np.asarray(alpha)[..., 3].min() < _OPAQUE:
-            return None
-        return np.asarray(opened.convert("RGB"))
-
-
-class _OwnEpisodes(msgspec.Struct):
-    """Our own part of a dataset: the header of each episode, with its outcome."""
-
-    format: Literal[1]
-    episodes: list[dict[str, Any]]
+        pixels = np.asarray(opened.convert("RGBA"))
+        return pixels[..., :3] if pixels[..., 3].min() == 255 else None
 
 
 def converted(plain: Any, kind: Any, where: object, *, strict: bool = True) -> Any:
@@ -225,34 +210,40 @@ def read_json(path: Path, kind: Any = dict[str, Any]) -> Any:
     return parse_json(read_text(path), path, kind)
 
 
+class _Own(msgspec.Struct):
+    """Our own part of a dataset: the header of each episode, with its outcome."""
+
+    format: Literal[1]
+    episodes: list[dict[str, Any]]
+
+
 def own_fields(header: EpisodeHeader, outcome: str) -> dict[str, Any]:
     """Return the fields of an exported episode that `own_episodes` reads."""
     return header.to_json() | {"outcome": outcome}
 
 
 def own_episodes(
-    section: Any, where: object, count: int
-) -> list[tuple[EpisodeHeader, str, dict[str, Any]]]:
-    """Return the header, outcome and all fields of each episode that Shapechanger exported.
+    section: Any, where: object, count: int, found: EpisodeHeader | None = None
+) -> list[tuple[EpisodeHeader, str, list[Driver]]]:
+    """Return the header, the outcome and the drivers of each episode that Shapechanger exported.
 
     Args:
         section: Our own section of a dataset.
         where: How to name it in errors.
         count: Number of episodes in the dataset.
+        found: What the rest of the dataset says, whose sizes must be the same.
     """
-    own: _OwnEpisodes = converted(section, _OwnEpisodes, where)
-    if len(own.episodes) != count:
-        raise DemosError(
-            f"{where} describes {len(own.episodes)} episodes, and the dataset has {count}: remove "
-            "it if the dataset was edited."
-        )
-    with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
-        return [
-            (EpisodeHeader.from_json(fields), str(fields.get("outcome", "")), fields)
-            for fields in own.episodes
-        ]
-
-
-def cannot_read(path: Path, error: OSError) -> DemosError:
-    """Return the error to raise when a file cannot be read."""
-    return DemosError(f"{path} cannot be read: {error.strerror or error}.")
+    own: _Own = converted(section, _Own, where)
+    episodes: list[tuple[EpisodeHeader, str, list[Driver]]] = []
+    for fields in own.episodes:
+        with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
+            header = EpisodeHeader.from_json(fields)
+        runs = converted(fields.get("drivers", []), list[tuple[Driver, int]], where)
+        drivers = list(islice(chain.from_iterable(repeat(*run) for run in runs), _MOST_STEPS))
+        episodes.append((header, str(fields.get("outcome", "")), drivers))
+    kinds = {(h.actions.size, h.states.size, h.image_size) for h, *_ in episodes}
+    if found is not None:
+        kinds.add((found.actions.size, found.states.size, found.image_size))
+    if len(episodes) != count or (found is not None and len(kinds) > 1):
+        raise DemosError(f"{where} is of another dataset: remove it if the dataset was edited.")
+    return episodes

@@ -212,7 +212,7 @@ class Format:
             format cannot be exported.
         options: Options that it takes: "camera" and "hz" on import; "task", "images" and "dropped"
             (excluded steps, marked as such) on export.
-        alike: What all episodes of a dataset have in common: "actions", "states", "image_size" and
+        common: What all episodes of a dataset have in common: "actions", "states", "image_size" and
             "control_hz" of their headers.
         consecutive: Whether each step follows the one before, so that an export splits episodes.
         timed: Whether it keeps the times of steps.
@@ -225,7 +225,7 @@ class Format:
     read: Callable[[Path, ImportContext], Iterator[ExchangeEpisode]] | None = None
     write: Callable[[Sequence[ExchangeEpisode], Path, ExportContext], int] | None = None
     options: frozenset[str] = frozenset()
-    alike: tuple[str, ...] = ()
+    common: tuple[str, ...] = ()
     consecutive: bool = False
     timed: bool = True
 

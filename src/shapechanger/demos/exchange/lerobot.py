@@ -18,7 +18,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, islice, product, repeat
+from itertools import chain, product, repeat
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, cast
 
@@ -113,14 +113,12 @@ class _Info(msgspec.Struct, kw_only=True):
 
 
 class _Entry(msgspec.Struct, kw_only=True):
-    """A row of `meta/episodes`: two columns of the data, and four of the video, if there is one."""
+    """A row of `meta/episodes`: the last four columns are of the video, if there is one."""
 
     episode_index: Annotated[int, msgspec.Meta(ge=0, lt=_MOST)]
     length: Annotated[int, msgspec.Meta(ge=1, lt=_MOST)]
     tasks: list[Annotated[str, msgspec.Meta(max_length=4096)]]
     dataset_from_index: int
-    data_chunk: int = msgspec.field(name="data/chunk_index")
-    data_file: int = msgspec.field(name="data/file_index")
     video_chunk: int = msgspec.field(name="chunk_index", default=0)
     video_file: int = msgspec.field(name="file_index", default=0)
     from_timestamp: _Seconds = 0.0
@@ -138,8 +136,7 @@ class _Dataset:
         if not (version := self._info.codebase_version).startswith("v3."):
             raise DemosError(
                 f"{folder} has version {version} of LeRobot's format, and only 3 can be imported: "
-                "`python -m lerobot.datasets.v30.convert_dataset_v21_to_v30` of lerobot 0.4 "
-                "converts v2.1."
+                "lerobot.datasets.v30.convert_dataset_v21_to_v30 of lerobot 0.4 converts v2.1."
             )
         for key, feature in self._info.features.items():
             feature.key = key
@@ -150,7 +147,7 @@ class _Dataset:
         self._video = f"videos/{camera.key}/" if camera and camera.kind == "video" else ""
         self._entries = self._read_entries()
         self._most_bytes = files.MAX_UNPACKED  # Of images in the tables, which can share one.
-        self._groups: dict[Path, dict[float, set[int]]] = {}
+        self._rows = self._find_rows()
         self._filmed: dict[str, list[_Entry]] = defaultdict(list)
         self._videos: dict[str, VideoTimes | DemosError] = {}
         for entry in self._entries.values():
@@ -170,19 +167,14 @@ class _Dataset:
         )
         path = self._folder / OURS
         count, is_ours = max(self._entries) + 1, path.is_file()
-        own = files.own_episodes(files.read_json(path), path, count) if is_ours else []
+        own = files.own_episodes(files.read_json(path), path, count, header) if is_ours else []
         for number, entry in self._entries.items():
+            head, outcome, drivers = own[number] if own else (header, "", [])
             task = {"task": ", ".join(entry.tasks)} if entry.tasks else {}
-            head, outcome, drivers = replace(header, notes=header.notes | task), "", list[Driver]()
-            if own:
-                ours, outcome, fields = own[number]
-                head, drivers = _own(ours, head, fields, f"{path}, episode {number}")
-            yield ExchangeEpisode(
-                header=head,
-                records=self._records(entry, drivers),
-                name=f"episode {number}",
-                outcome=outcome,
-            )
+            clock = "real" if head.clock == "none" else head.clock  # Times come from the dataset.
+            head = replace(head, clock=clock, notes=header.notes | task | head.notes)
+            records, name = self._records(entry, drivers), f"episode {number}"
+            yield ExchangeEpisode(header=head, records=records, name=name, outcome=outcome)
 
     def _choose_features(self, features: Sequence[_Feature]) -> None:
         """Choose the action, the states, the camera and single numbers, and report the others."""
@@ -209,8 +201,8 @@ class _Dataset:
 
     def _read_entries(self) -> dict[int, _Entry]:
         """Return the rows of `meta/episodes` by their number, in order."""
-        fields = _Entry.__struct_encode_fields__[: None if self._video else 6]
-        names = [name if n < 6 else self._video + name for n, name in enumerate(fields)]
+        fields = _Entry.__struct_encode_fields__[: None if self._video else 4]
+        names = [name if n < 4 else self._video + name for n, name in enumerate(fields)]
         entries: list[_Entry] = []
         for path in sorted((self._folder / EPISODES).glob("*/*.parquet")):
             files.inside(self._folder, str(path.relative_to(self._folder)), path)
@@ -222,51 +214,46 @@ class _Dataset:
             raise DemosError(f"{self._folder / EPISODES} does not have each episode once.")
         totals = self._info.total_episodes, self._info.total_frames
         if totals != (count := (len(entries), sum(entry.length for entry in entries))):
-            about = "{} has {} episodes with {} steps, and {} {} with {}."
-            self._context.report("warning", about.format(INFO, *totals, EPISODES, *count))
+            text = f"{INFO} has {totals} episodes and steps, and {EPISODES} {count}."
+            self._context.report("warning", text)
         return dict(sorted(found.items()))
 
-    def _groups_of(self, path: Path) -> dict[float, set[int]]:
-        """Return the row groups of a Parquet file that have rows of each episode."""
-        if path not in self._groups:
-            found = defaultdict[float, set[int]](set)
-            for group, batch in _batches(path, _KEYS[:1]):
-                for number in np.unique(_vectors(batch, _KEYS[0], 1, path)).tolist():
-                    found[number].add(group)
-            self._groups[path] = found
-            self._most_bytes += _MAX_PACKED * path.stat().st_size
-            names = files.library("pyarrow.parquet", "lerobot").read_schema(path).names
-            for column in sorted(set(names) - self._info.features.keys()):
-                if not column.startswith("__index_level_"):  # Of pandas.
-                    text = f"a column that {INFO} does not describe"
-                    self._context.report("left out", text, column)
-            for number in sorted(found.keys() - self._entries.keys()):
-                text = f"{EPISODES} does not have it"
-                self._context.report("left out", text, f"episode {number:g}")
-        return self._groups[path]
+    def _find_rows(self) -> dict[float, list[tuple[Path, set[int]]]]:
+        """Return the files and row groups with rows of each episode.
 
-    def _data_file(self, entry: _Entry) -> Path:
-        """Return the file with the rows of an episode.
-
-        LeRobot's converter to version 3 wrote wrong numbers of files (its issue 2401), so the rows
-        are searched in all files if the one that `meta/episodes` names does not have them.
+        All files are searched, because LeRobot's converter to version 3 wrote wrong numbers of
+        files to `meta/episodes` (its issue 2401).
         """
-        name = self._named(self._info.data_path, entry.data_chunk, entry.data_file)
-        every = glob.glob(_PLACE.sub("*", glob.escape(self._info.data_path)), root_dir=self._folder)
-        for at in sorted(every, key=lambda at: (at != name, at)):
-            path = files.inside(self._folder, at, INFO)
-            if self._groups_of(path)[entry.episode_index]:
-                return path
-        return files.inside(self._folder, name, f"{self._folder / EPISODES} with {INFO}")
-
-    def _named(self, template: str, chunk: int, file: int) -> str:
-        """Fill in a template of `info.json`, without Python's own formats."""
-        about = {"chunk_index": str(chunk), "file_index": str(file)}
-        about["video_key"] = self._video.removeprefix("videos/").rstrip("/")
-        return _PLACE.sub(lambda at: about[at[1]].rjust(int(at[2] or 0), "0"), template)
+        found = defaultdict[float, list[tuple[Path, set[int]]]](list)
+        columns = set[str]()
+        pattern = _PLACE.sub("*", glob.escape(self._info.data_path))
+        for name in sorted(glob.glob(pattern, root_dir=self._folder)):
+            try:
+                path = files.inside(self._folder, name, INFO)
+                groups = defaultdict[float, set[int]](set)
+                for group, batch in _batches(path, _KEYS[:1]):
+                    for number in np.unique(_vectors(batch, _KEYS[0], 1, path)).tolist():
+                        groups[number].add(group)
+                columns |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
+            except DemosError as error:
+                self._context.report("left out", str(error).removesuffix("."), name)
+                continue
+            self._most_bytes += _MAX_PACKED * path.stat().st_size
+            for number, these in groups.items():
+                found[number].append((path, these))
+        for column in sorted(columns - self._info.features.keys()):
+            if not column.startswith("__index_level_"):  # Of pandas.
+                self._context.report("left out", f"a column that {INFO} does not describe", column)
+        for number in sorted(found.keys() - self._entries.keys()):
+            self._context.report("left out", f"{EPISODES} does not have it", f"episode {number:g}")
+        return found
 
     def _video_name(self, entry: _Entry) -> str:
-        return self._named(self._info.video_path or "", entry.video_chunk, entry.video_file)
+        """Fill in the template of `info.json`, without Python's own formats."""
+        about = {"chunk_index": str(entry.video_chunk), "file_index": str(entry.video_file)}
+        about["video_key"] = self._video.removeprefix("videos/").rstrip("/")
+        template = self._info.video_path or ""
+        return _PLACE.sub(lambda at: about[at[1]].rjust(int(at[2] or 0), "0"), template)
 
     def _read_video(self, name: str) -> VideoTimes:
         """Return the times of a video, if they are those that its entries state."""
@@ -308,9 +295,7 @@ class _Dataset:
         nearest = np.searchsorted((times.seconds[1:] + times.seconds[:-1]) / 2.0, at_s)
         off_s = np.abs(times.seconds[nearest] - at_s)
         if not (off_s <= most_s).all() or at_s[-1] > entry.to_timestamp - 2.0 * most_s[-1]:
-            raise DemosError(
-                f"{name} lacks an image within {_TOLERANCE_S * 1e3:g} ms of each step."
-            )
+            raise DemosError(f"{name} lacks an image at the time of a step.")
         return read_pictures(self._folder / name, times, times.ticks[nearest])
 
     def _records(self, entry: _Entry, drivers: Sequence[Driver]) -> Iterator[Record]:
@@ -321,8 +306,10 @@ class _Dataset:
         steps = enumerate(self._pictures(entry) if self._video else repeat(None, entry.length))
         done, read = 0, b""
         stored = [self._stored] if self._stored else []
-        path = self._data_file(entry)
-        for _, batch in _batches(path, [*sizes, *stored], self._groups_of(path)[number]):
+        if len(places := self._rows.get(number, [])) != 1:
+            raise DemosError(f"{len(places)} files of {self._info.data_path} have its rows, not 1.")
+        ((path, groups),) = places
+        for _, batch in _batches(path, [*sizes, *stored], groups):
             columns = {key: _vectors(batch, key, size, path) for key, size in sizes.items()}
             ours = np.flatnonzero(columns[_KEYS[0]] == number)
             if not len(ours):
@@ -368,8 +355,11 @@ class _Dataset:
 
 
 def _bytes(image: Any) -> bytes:
-    data = cast("dict[str, Any]", image).get("bytes") if isinstance(image, dict) else None
-    return data if isinstance(data, bytes) else b""
+    match image:
+        case {"bytes": bytes() as data}:
+            return data
+        case _:
+            return b""
 
 
 def _flat_names(plain: Any) -> tuple[str, ...]:
@@ -398,23 +388,6 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
             names = []
         found += features_of(key, size, names=names, units=_flat_names(feature.units))
     return as_json(found)
-
-
-def _own(
-    header: EpisodeHeader, found: EpisodeHeader, fields: dict[str, Any], where: str
-) -> tuple[EpisodeHeader, list[Driver]]:
-    """Return the header of an own episode, with the notes of `found`, and each step's driver."""
-    runs = files.converted(fields.get("drivers", []), list[tuple[Driver, int]], where)
-    drivers = islice(chain.from_iterable(repeat(*run) for run in runs), _MOST)
-    ours, theirs = ((one.actions.size, one.states.size, one.image_size) for one in (header, found))
-    if ours != theirs:
-        raise DemosError(
-            f"{where} is of another dataset, with other actions, states or images: remove the "
-            "file if the dataset was edited."
-        )
-    # The times come from the dataset.
-    clock = "real" if header.clock == "none" else header.clock
-    return replace(header, clock=clock, notes=found.notes | header.notes), list(drivers)
 
 
 def _batches(
@@ -464,7 +437,7 @@ FORMAT: Final = Format(
     read=lambda folder, context: _Dataset(folder, context).read(),
     write=write,
     options=frozenset({"camera", "task", "images"}),
-    alike=("actions", "states", "image_size", "control_hz"),
+    common=("actions", "states", "image_size", "control_hz"),
     consecutive=True,
     timed=False,
 )

@@ -28,7 +28,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import Step
+from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange.files import library, own_fields
 from shapechanger.demos.exchange.format import (
     COLUMNS,
@@ -67,7 +67,7 @@ _Columns = dict[str, NDArray[Any]]
 
 def write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
     """Write episodes into an existing folder, as one dataset, and return the number of steps."""
-    dataset = _Dataset(episodes[0], folder, context)
+    dataset = _Dataset(episodes[0].header, folder, context)
     for episode in episodes:
         dataset.add(episode)
     dataset.finish()
@@ -77,13 +77,13 @@ def write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCont
 class _Dataset:
     """A dataset that is being written."""
 
-    def __init__(self, first: ExchangeEpisode, folder: Path, context: ExportContext) -> None:
+    def __init__(self, header: EpisodeHeader, folder: Path, context: ExportContext) -> None:
         self.steps = 0
         self._arrow = library("pyarrow", "lerobot")
         self._parquet = library("pyarrow.parquet", "lerobot")
         self._folder = folder
         self._context = context
-        self._header = header = first.header
+        self._header = header
         self._is_filmed = header.image_size is not None and not context.images
         self._rate = Fraction(header.control_hz).limit_denominator(_SMALLEST_FRACTION)
         self._fps = self._rate.numerator if self._rate.denominator == 1 else float(self._rate)
@@ -189,9 +189,7 @@ class _Dataset:
         stored: dict[str, Any] = {}
         for key, values in columns.items():
             if not np.isfinite(values).all():
-                raise DemosError(
-                    f"{name} has a number in {key} that is not finite in 32 bits: export it to csv."
-                )
+                raise DemosError(f"{name} has a number in {key} that is not finite in 32 bits.")
             size, flat = values.shape[1], arrow.array(values.ravel())
             lists = arrow.FixedSizeListArray
             stored[key] = flat if size == 1 else lists.from_arrays(flat, size)

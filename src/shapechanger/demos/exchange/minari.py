@@ -23,7 +23,7 @@ from dataclasses import replace
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Annotated, Any, Final
 
 import gymnasium as gym
 import msgspec
@@ -64,6 +64,7 @@ _STORAGE: Final = "minari.dataset.minari_storage"
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
 _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
+_MIN_JPEG: Final = 32  # Pixels. Minari 0.5 stores smaller images as pixels (`is_image_space`).
 _CHANNELS: Final = (1, 3)
 _DEEP: Final = ("uint16", "int16", "uint32")
 _DESCRIPTION: Final = (
@@ -79,6 +80,71 @@ class _Rest(msgspec.Struct):
     step: dict[str, Any]
     marks: tuple[str, ...]
     dropped: str | None
+
+
+class _Metadata(msgspec.Struct, kw_only=True):
+    """`metadata.json`."""
+
+    observation_space: str
+    action_space: str
+    total_episodes: Annotated[int, msgspec.Meta(ge=1)]
+    data_format: str = "hdf5"
+    dataset_id: str = ""
+    control_hz: float | None = None
+    ours: Any = msgspec.field(default=None, name=_OURS)
+
+
+class _Space(msgspec.Struct, kw_only=True):
+    """A space of Gymnasium, as Minari writes it; each type has some of the fields."""
+
+    type: str
+    dtype: str = ""
+    shape: tuple[Annotated[int, msgspec.Meta(ge=0)], ...] = ()
+    low: Any = 0
+    high: Any = 1
+    start: Any = 0
+    n: Any = 0
+    nvec: Any = 0
+    subspaces: dict[str, _Space] | list[_Space] = []
+
+    def leaves(self, at: str = "") -> Iterator[tuple[str, _Space]]:
+        """Yield the spaces in it, in the order and with the keys of Minari's files."""
+        match self.subspaces:
+            case dict() as named:
+                inner = sorted(named.items())
+            case listed:
+                inner = [(f"_index_{n}", one) for n, one in enumerate(listed)]
+        for key, one in inner:
+            yield from one.leaves(f"{at}/{key}")
+        if self.type not in {"Dict", "Tuple"}:
+            yield at, self
+
+    def numbers(self) -> tuple[tuple[int, ...], Any, Any] | None:
+        """Return the shape and the bounds of numbers; None for anything else."""
+        match self.type:
+            case "Box":
+                return self.shape, self.low, self.high
+            case "Discrete":
+                return (), self.start, self.start + self.n - 1
+            case "MultiDiscrete":
+                return np.shape(self.nvec), self.start, np.add(self.start, self.nvec) - 1
+            case "MultiBinary":
+                return tuple(np.atleast_1d(self.n).tolist()), 0, 1
+            case _:
+                return None
+
+    def image_size(self) -> tuple[int, int] | None:
+        """Return the width and height of its images; None if it has no images."""
+        if self.type != "Box" or self.dtype != "uint8" or len(self.shape) not in {2, 3}:
+            return None
+        height, width, *channels = self.shape[1:] if _colours_first(self.shape) else self.shape
+        is_picture = not channels or channels[0] in _CHANNELS
+        fits = min(height, width) >= _MIN_PICTURE and height * width <= MAX_PIXELS
+        return (width, height) if is_picture and fits else None
+
+
+def _colours_first(shape: Sequence[int]) -> bool:
+    return len(shape) == 3 and shape[0] in _CHANNELS and shape[2] not in _CHANNELS
 
 
 def _data_folder(folder: Path) -> Path | None:
@@ -112,58 +178,80 @@ def _arrays(file: Any, number: int) -> dict[str, Any]:
 
 
 class _Dataset:
-    """A dataset that is read; columns of action and state map to their number of values."""
+    """A dataset that is read."""
 
     def __init__(self, folder: Path, context: ImportContext) -> None:
         place = _data_folder(folder) or folder
         self._path = path = place / _METADATA
         self._context = context
-        metadata = files.read_json(path)
-        if (stored := metadata.get("data_format", "hdf5")) != "hdf5":
-            raise DemosError(f"{folder} is stored as {stored!r}: only 'hdf5' is read.")
+        about: _Metadata = files.read_json(path, _Metadata)
+        if about.data_format != "hdf5":
+            raise DemosError(f"{folder} is stored as {about.data_format!r}: only 'hdf5' is read.")
         self._main = files.inside(place, _MAIN, path)
-        self._count, self._most = metadata.get("total_episodes"), self._main.stat().st_size
-        if type(self._count) is not int or not 1 <= self._count <= self._most:
-            raise DemosError(
-                f"{path}: total_episodes must be a positive integer, got {self._count!r}."
-            )
+        self._count, self._most = about.total_episodes, self._main.stat().st_size
+        if self._count > self._most:
+            raise DemosError(f"{path} claims {self._count} episodes, but {_MAIN} is smaller.")
         self._claimed = 0
-        has_own = _OURS in metadata
-        self._own = files.own_episodes(metadata[_OURS], path, self._count) if has_own else []
         observed, acted = (
-            _leaves(metadata, f"{of}_space", path) for of in ("observation", "action")
+            dict(files.parse_json(text, f"A space in {path}", _Space).leaves())
+            for text in (about.observation_space, about.action_space)
         )
-        images = {at: size for at, space in observed.items() if (size := _picture_size(space))}
+        images = {at: size for at, space in observed.items() if (size := space.image_size())}
         if len(images) > 1:
             raise DemosError(f"{path} has {len(images)} images ({', '.join(images)}): keep one.")
+        self._image = "".join(_OBSERVATIONS + at for at in images)
+        self._shape = next((observed[at].shape for at in images), None)  # Of pixels.
         sensed = {at: space for at, space in observed.items() if at not in images}
-        states = _features(sensed, _OBSERVATIONS, context)
-        actions = _features(acted, _ACTION, context)
+        states, actions = self._features(sensed, _OBSERVATIONS), self._features(acted, _ACTION)
         if len(actions) < len(acted):
             names = "Box, Discrete, MultiDiscrete or MultiBinary"
-            raise DemosError(f"{path}: the action_space must consist of {names}.")
-        hz = metadata.get("control_hz", context.hz)
-        known = type(hz) in {int, float} and math.isfinite(hz) and hz > 0.0
-        if not known:
+            raise DemosError(f"{path}: the action_space must consist of {names} of few values.")
+        hz = about.control_hz or context.hz
+        if hz is None or not 0.0 < hz < math.inf:
             text = f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it."
             context.report("note", text)
+            hz = None
         self._header = EpisodeHeader(
             action_layout=as_json(list(chain(*actions.values()))),
             state_layout=as_json(list(chain(*states.values()))),
             image_size=next(iter(images.values()), None),
-            control_hz=float(hz) if known else DEFAULT_HZ,
+            control_hz=hz or DEFAULT_HZ,
             clock="none",
             source="minari",
-            notes={"dataset": str(metadata.get("dataset_id", "")), "rate_is_known": known},
+            notes={"dataset": about.dataset_id, "rate_is_known": hz is not None},
         )
-        self._action = {at: sum(one.size for one in part) for at, part in actions.items()}
-        self._state = {at: sum(one.size for one in part) for at, part in states.items()}
-        self._picture = "".join(_OBSERVATIONS + at for at in images)
-        is_jpeg = bool(metadata.get("jpeg_encoding", True)) and all(
-            library(_STORAGE).is_image_space(observed[at]) for at in images
+        self._own = (
+            [*files.own_episodes(about.ours, path, self._count, self._header)]
+            if about.ours is not None
+            else []
         )
-        # The shape of an image; None for JPEG.
-        self._pixels = None if is_jpeg else next((observed[at].shape for at in images), None)
+        # The number of values of each column.
+        self._action, self._state = (
+            {at: sum(one.size for one in part) for at, part in features.items()}
+            for features in (actions, states)
+        )
+
+    def _features(self, leaves: Mapping[str, _Space], part: str) -> dict[str, list[Feature]]:
+        """Return the features of each numeric leaf, keyed by column; other leaves are reported."""
+        found: dict[str, list[Feature]] = {}
+        for at, space in leaves.items():
+            what = part.removesuffix("s")
+            name = at.strip("/") or what
+            about = f"{what} {name} ({space.type} {space.dtype} {list(space.shape)})"
+            wrong = f"The {about} in {self._path} is damaged."
+            with translate_errors(TypeError, ValueError, to=lambda _, w=wrong: DemosError(w)):
+                if (numbers := space.numbers()) is None:
+                    self._context.report("note", f"The {about} is not imported.")
+                    continue
+                shape, *ends = numbers
+                size, deep = math.prod(shape), len(shape) > 1 and space.dtype in _DEEP
+                if deep or not 0 < size <= MAX_VALUES:
+                    reason = f"no or more than {MAX_VALUES} values, or images of depth"
+                    self._context.report("left out", reason, about)
+                    continue
+                low, high = (np.broadcast_to(np.ravel(end).astype(float), size) for end in ends)
+                found[part + at] = features_of(name, size, low=low.tolist(), high=high.tolist())
+        return found
 
     def read(self) -> Iterator[ExchangeEpisode]:
         """Yield the episodes."""
@@ -173,23 +261,14 @@ class _Dataset:
                 self._context.report("warning", text)
         for number in range(self._count):
             header, outcome, _ = self._own[number] if self._own else (self._header, "", None)
-            yield ExchangeEpisode(
-                header=header,
-                records=self._records(number),
-                name=f"episode_{number} of {_MAIN}",
-                outcome=outcome,
-            )
+            records, name = self._records(number), f"episode_{number} of {_MAIN}"
+            yield ExchangeEpisode(header=header, records=records, name=name, outcome=outcome)
 
     def _columns(self, file: Any, number: int) -> dict[str, Any]:
         """Return the columns of an episode; refuse columns that do not fit together."""
         where, arrays = f"episode_{number}", _arrays(file, number)
-        sizes = {_TERMINATED: 1, _TRUNCATED: 1, **self._action, **self._state}
-        if self._own or _REWARD in arrays:
-            sizes[_REWARD] = 1
-        else:
-            text = f"{_MAIN} lacks rewards: the steps of such episodes have none."
-            self._context.report("warning", text)
-        images = [self._picture] if self._picture else []
+        sizes = {_TERMINATED: 1, _TRUNCATED: 1, _REWARD: 1, **self._action, **self._state}
+        images = [self._image] if self._image else []
         infos = [_STEP, *([_FRAME] if images else [])] if self._own else []
         names = [*sizes, *infos, *images]
         if missing := [name for name in names if name not in arrays]:
@@ -210,8 +289,9 @@ class _Dataset:
             numeric = one.dtype.kind in "biuf" and math.prod(one.shape[1:]) == sizes.get(name)
             if name in sizes and not numeric:
                 raise DemosError(f"{where}: {name!r} does not have {sizes[name]} numbers in a row.")
-            fits = one.dtype == np.uint8 and one.shape[1:] == self._pixels
-            if name in images and self._pixels and not fits:
+            is_jpeg = len(one.shape) <= 2  # Minari pads them to one length.
+            is_whole = one.shape[1:] == self._shape and one.dtype == np.uint8
+            if name in images and not is_jpeg and not is_whole:
                 raise DemosError(f"{where}: {name!r} has images that do not fit their space.")
         stated = file[where].attrs.get("total_steps", steps)
         if not np.array_equal(np.ravel(stated), [steps]):
@@ -219,9 +299,7 @@ class _Dataset:
         # HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
         self._claimed += 3 * steps
         if self._claimed > self._most:
-            raise DemosError(
-                f"{_MAIN} claims at least {self._claimed} values, but has {self._most} bytes."
-            )
+            raise DemosError(f"{_MAIN} claims at least {self._claimed} values, but is smaller.")
         return columns
 
     def _records(self, number: int) -> Iterator[Record]:
@@ -234,16 +312,15 @@ class _Dataset:
                 for n in range(len(part[_TERMINATED])):
                     row = {name: values[n] for name, values in part.items()}
                     name = f"step {start + n} of episode_{number}"
-                    wrong = f"{_STEP} of {name} is damaged"
-                    with translate_errors(
-                        *_BAD_JSON, to=lambda e, w=wrong: DemosError(f"{w}: {e}.")
-                    ):
+                    try:
                         record = self._record(row, start + n)
+                    except _BAD_JSON as error:
+                        raise DemosError(f"{_STEP} of {name} is damaged: {error}.") from error
                     record.name = name
                     yield record
 
     def _record(self, row: Mapping[str, Any], number: int) -> Record:
-        (reward,) = _numbers(row, [_REWARD]) if _REWARD in row else [math.nan]
+        (reward,) = _numbers(row, [_REWARD])
         fields: dict[str, Any] = {"driver": "expert", "truncated": bool(row[_TRUNCATED])}
         rest = _Rest(step=fields, marks=(), dropped=None)
         if self._own:
@@ -254,93 +331,17 @@ class _Dataset:
         known = {"action": action, "state": state, "terminated": bool(row[_TERMINATED])}
         record = Record(step=Step.from_json(rest.step | known))
         record.marks, record.dropped = rest.marks, rest.dropped
-        if self._picture:
-            record.frame, stored = int(row.get(_FRAME, number)), row[self._picture]
-            record.image = _pixels(stored) if self._pixels else bytes(stored)
+        if self._image:
+            record.frame, stored = int(row.get(_FRAME, number)), row[self._image]
+            record.image = _last_colours(stored) if stored.ndim > 1 else bytes(stored)
         return record
-
-
-def _leaves(metadata: Mapping[str, Any], name: str, path: Path) -> dict[str, spaces.Space[Any]]:
-    """Return the leaves of a space in the metadata, keyed by path, such as "/image"."""
-    text, where = metadata.get(name), f"The {name} in {path}"
-    if not isinstance(text, str):
-        raise DemosError(f"{path} has no {name}: create the dataset again with this space.")
-    read = library("minari.serialization").deserialize_space
-    # Its errors for invalid text are not documented.
-    with translate_errors(Exception, to=lambda e: DemosError(f"{where} cannot be read: {e}.")):
-        leaves = dict(_walked(json.loads(text)))
-        # Gymnasium fills arrays of any shape with its bounds.
-        if sum(abs(math.prod(leaf.get("shape", ()))) for leaf in leaves.values()) > MAX_UNPACKED:
-            raise ValueError(f"it claims more than {MAX_UNPACKED} values")
-        return {at: read(leaf) for at, leaf in leaves.items()}
-
-
-def _walked(space: Any, at: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the leaves of the JSON of a space, in the order and with the keys of Minari's files."""
-    match space["type"]:
-        case "Dict":
-            named = sorted(space["subspaces"].items())
-        case "Tuple":
-            named = [(f"_index_{n}", inner) for n, inner in enumerate(space["subspaces"])]
-        case _:
-            yield at, space
-            return
-    for key, inner in named:
-        yield from _walked(inner, f"{at}/{key}")
-
-
-def _features(
-    leaves: Mapping[str, spaces.Space[Any]], part: str, context: ImportContext
-) -> dict[str, list[Feature]]:
-    """Return the features of each numeric leaf, keyed by column; other leaves are reported."""
-    found: dict[str, list[Feature]] = {}
-    for at, space in leaves.items():
-        shape, what = space.shape or (), part.removesuffix("s")
-        name, size, ends = at.strip("/") or what, math.prod(shape), None
-        match space:
-            case spaces.Box():
-                ends = space.low, space.high
-            case spaces.Discrete():
-                ends = space.start, space.start + space.n - 1
-            case spaces.MultiDiscrete():
-                ends = space.start, space.start + space.nvec - 1
-            case spaces.MultiBinary():
-                ends = 0, 1
-            case _:
-                context.report("note", f"The {what} {name} ({space}) is not imported.")
-        if ends and (not 0 < size <= MAX_VALUES or (len(shape) > 1 and str(space.dtype) in _DEEP)):
-            reason = f"no or more than {MAX_VALUES} values, or images of depth"
-            context.report("left out", reason, f"{what} {name} ({space})")
-        elif ends:
-            low, high = (
-                np.broadcast_to(np.ravel(end).astype(float), size).tolist() for end in ends
-            )
-            found[part + at] = features_of(name, size, low=low, high=high)
-    return found
-
-
-def _picture_size(space: spaces.Space[Any]) -> tuple[int, int] | None:
-    """Return the width and height of the images of a space; None if it has no images."""
-    shape = space.shape or ()
-    if not isinstance(space, spaces.Box) or str(cast("Any", space).dtype) != "uint8":
-        return None
-    if len(shape) not in {2, 3}:
-        return None
-    height, width, *channels = list(shape[1:] if _colours_first(shape) else shape)
-    is_picture = not channels or channels[0] in _CHANNELS
-    fits = min(height, width) >= _MIN_PICTURE and height * width <= MAX_PIXELS
-    return (width, height) if is_picture and fits else None
-
-
-def _colours_first(shape: tuple[int, ...]) -> bool:
-    return len(shape) == 3 and shape[0] in _CHANNELS and shape[2] not in _CHANNELS
 
 
 def _numbers(row: Mapping[str, Any], names: Iterable[str]) -> list[float]:
     return [value for name in names for value in np.ravel(row[name]).astype(float).tolist()]
 
 
-def _pixels(stored: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _last_colours(stored: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return an image with its three colours last."""
     pixels = np.moveaxis(stored, 0, -1) if _colours_first(stored.shape) else np.atleast_3d(stored)
     return np.repeat(pixels, 3 // pixels.shape[-1], -1)
@@ -351,10 +352,8 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
     name = context.out.name
     if not _NAME.fullmatch(name):
         better = re.sub(r"[^\w-]+", "-", name).strip("-") or "drive"
-        raise DemosError(
-            f"Minari loads a dataset by its name, which must end in a version: call it "
-            f"{context.out.with_name(f'{better}-v0')}, not {context.out}."
-        )
+        better = context.out.with_name(f"{better}-v0")
+        raise DemosError(f"A Minari dataset needs a name with a version: call it {better}.")
     header, records = episodes[0].header, iter(episodes[0].records)
     first = next(records)
     grey = header.image_size is not None and is_grey(first.jpeg or b"", "of the first step")
@@ -376,15 +375,14 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
                 group.attrs["seed"] = episode.header.seed
             drivers.update(step.driver for step in steps)
             total += len(steps)
-    plain = header.to_json()
     own = [files.own_fields(episode.header, episode.outcome) for episode in episodes]
     about: dict[str, Any] = {
         "dataset_id": name,
         "minari_version": version("minari"),
         "algorithm_name": ", ".join(sorted(drivers)),
         "description": _DESCRIPTION,
-        "action_layout": plain["action_layout"],
-        "observation_layout": plain["state_layout"],
+        "action_layout": own[0]["action_layout"],
+        "observation_layout": own[0]["state_layout"],
         "control_hz": header.control_hz,
         _OURS: {"format": 1, "episodes": own},
         "total_episodes": len(episodes),
@@ -407,14 +405,11 @@ def _space_of(episode: ExchangeEpisode, grey: bool) -> spaces.Space[Any]:
     header, found = episode.header, dict[str, spaces.Space[Any]]()
     if header.image_size is not None:
         width, height = header.image_size
-        found["image"] = image = spaces.Box(
-            0, 255, (height, width) if grey else (height, width, 3), np.uint8
-        )
-        if not library(_STORAGE).is_image_space(image):
-            raise DemosError(
-                f"Minari does not store images of {width} x {height} pixels as JPEG: export them "
-                "to csv or lerobot."
-            )
+        if min(width, height) < _MIN_JPEG:
+            text = f"Minari stores no images of {width} x {height} pixels as JPEG"
+            raise DemosError(f"{text}: export {episode.name} to csv or lerobot.")
+        shape = (height, width) if grey else (height, width, 3)
+        found["image"] = spaces.Box(0, 255, shape, np.uint8)
     if header.state_layout:
         found["state"] = spaces.Box(header.states.low, header.states.high, dtype=np.float64)
     if not found:
@@ -448,8 +443,7 @@ def _write_episode(group: Any, episode: ExchangeEpisode, grey: bool) -> list[Ste
             frame, jpeg = frame + 1, record.jpeg or b""
             where = f"of step {len(steps)} of {episode.name}"
             if is_grey(jpeg, where) != grey:
-                kinds = "is grey, and the first one is not", "is not grey, and the first one is"
-                raise DemosError(f"The image {where} {kinds[grey]}: Minari needs one kind.")
+                raise DemosError(f"Minari needs grey or coloured images, and not both {where}.")
         if images is not None:
             images.resize(len(images) + 1, axis=0)
             images[-1] = np.frombuffer(jpeg, np.uint8)
@@ -483,6 +477,6 @@ FORMAT: Final = Format(
     read=lambda folder, context: _Dataset(folder, context).read(),
     write=_write,
     options=frozenset({"hz", "dropped"}),
-    alike=("actions", "states", "image_size", "control_hz"),
+    common=("actions", "states", "image_size", "control_hz"),
     consecutive=True,
 )

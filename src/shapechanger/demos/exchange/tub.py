@@ -335,5 +335,5 @@ FORMAT: Final = Format(
     read=_read,
     write=_write,
     options=frozenset({"camera", "hz"}),
-    alike=("actions", "states"),
+    common=("actions", "states"),
 )

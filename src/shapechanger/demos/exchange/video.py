@@ -26,12 +26,7 @@ _MAX_SAMPLES: Final = 1 << 21  # Of a video: 10 hours at 60 Hz, and 50 MB of FFm
 
 
 class VideoWriter:
-    """Writer of a video in H.264, with 4:2:0 colours and a constant rate.
-
-    Args:
-        path: The file to create.
-        size: Width and height in pixels; both even.
-        rate: Images per second.
+    """Writer of a video in H.264, with 4:2:0 colours and a constant rate, images per second.
 
     Attributes:
         frames: Number of images written.
@@ -44,10 +39,8 @@ class VideoWriter:
     def __init__(self, path: Path, size: tuple[int, int], rate: Fraction) -> None:
         width, height = size
         if width % 2 or height % 2:
-            raise DemosError(
-                f"A video needs an even width and height, and the images have {width} x "
-                f"{height} pixels: export them with --images."
-            )
+            text = f"A video needs even sizes, and not {width} x {height} pixels"
+            raise DemosError(f"{text}: export them with --images.")
         self.frames = 0
         self._path = path
         self._period_s = 1 / rate
@@ -70,9 +63,7 @@ class VideoWriter:
         self._file.mux(self._images.encode(None))
         self._file.close()
         if (written := len(read_times(self._path).ticks)) != self.frames:
-            raise OutputError(
-                f"Cannot write {self._path}: it has {written} of {self.frames} images."
-            )
+            raise OutputError(f"Cannot write {self._path}: it has {written} images.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,17 +72,20 @@ class VideoTimes:
 
     Attributes:
         ticks: Times, ascending, shape (n,).
-        seconds: The same in seconds.
         keys: Decoding time of the key frame from which to decode each image, shape (n,).
         tick_s: Length of a tick, s.
         size: Width and height of the images, pixels.
     """
 
     ticks: NDArray[np.int64]
-    seconds: NDArray[np.float64]
     keys: NDArray[np.int64]
     tick_s: Fraction
     size: tuple[int, int]
+
+    @property
+    def seconds(self) -> NDArray[np.float64]:
+        """The times in seconds."""
+        return self.ticks.astype(np.float64) * float(self.tick_s)
 
 
 def _require_whole(path: Path) -> None:
@@ -123,10 +117,9 @@ def _require_whole(path: Path) -> None:
     samples = claimed(b"stsz|stz2", 8) + claimed(b"trun", 4)
     in_chunks = 0
     for match in re.finditer(b"stsc", tables):
-        runs = tables[match.end() + 8 :][
-            : 12 * int.from_bytes(tables[match.end() + 4 :][:4], "big")
-        ]
-        each = np.frombuffer(runs[: len(runs) // 12 * 12], ">u4")[1::3]
+        runs = 12 * int.from_bytes(tables[match.end() + 4 :][:4], "big")
+        table = tables[match.end() + 8 :][:runs]
+        each = np.frombuffer(table[: len(table) // 12 * 12], ">u4")[1::3]
         in_chunks += int(each.max(initial=0)) // 1024 * claimed(b"stco|co64", 4)
     if (samples + in_chunks) * (1 + claimed(b"elst", 4)) > _MAX_SAMPLES or b"cmov" in tables:
         raise DemosError(f"{path} claims to have more than {_MAX_SAMPLES} images.")
@@ -172,10 +165,7 @@ def read_times(path: Path) -> VideoTimes:
         codec = stream.codec_context
         form: Any = codec.format
         if form is not None and len(form.components) < 3 and form.components[0].bits > 8:
-            raise DemosError(
-                f"{path} has grey images of more than 8 bits ({form.name}), like those of "
-                "a depth camera, which cannot be imported."
-            )
+            raise DemosError(f"{path} has grey images of more than 8 bits ({form.name}).")
         ticks, dts, is_key, shown = np.array(sorted(found), np.int64).reshape(-1, 4).T
         if not shown.any():
             raise DemosError(f"{path} has no images: restore it.")
@@ -183,9 +173,7 @@ def read_times(path: Path) -> VideoTimes:
         ticks, keys = ticks[shown > 0], keys[shown > 0]
         if (np.diff(ticks) == 0).any():
             raise DemosError(f"{path} has two images at one time.")
-        seconds = ticks.astype(np.float64) * float(stream.time_base)
-        size = (codec.width, codec.height)
-        return VideoTimes(ticks, seconds, keys, stream.time_base, size)
+        return VideoTimes(ticks, keys, stream.time_base, (codec.width, codec.height))
 
 
 def read_pictures(
@@ -204,8 +192,7 @@ def read_pictures(
             while shown is not None and (shown.pts is None or shown.pts < tick):
                 shown = next(frames, None)
             if shown is None or shown.pts != tick or shown.is_corrupt:
-                at_s = float(tick * times.tick_s)
-                raise DemosError(f"{path} is damaged: it has no image at {at_s:.3f} s.")
+                raise DemosError(f"{path} is damaged: it has no image at {tick} ticks.")
             if (shown.width, shown.height) != times.size:
                 raise DemosError(f"{path} has images of several sizes.")
             yield shown.to_ndarray(format="rgb24", interpolation="BICUBIC")
