@@ -21,7 +21,7 @@ from shapechanger.demos.episodes import (
     read_episode,
 )
 from shapechanger.demos.exchange import Converted, Format, ImportContext, Record
-from shapechanger.demos.exchange.format import whole_records
+from shapechanger.demos.exchange.base import whole_records
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 

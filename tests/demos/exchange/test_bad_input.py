@@ -13,11 +13,7 @@ import numpy as np
 import pytest
 
 from shapechanger.demos.episodes import Step
-from shapechanger.demos.exchange import (
-    export_recording,
-    import_episodes,
-    import_recording,
-)
+from shapechanger.demos.exchange import export_recording, import_recording
 from shapechanger.errors import DemosError, OutputError, ShapechangerError, UnknownName
 from tests.demos.exchange.small import (
     all_of,
@@ -180,7 +176,11 @@ def _with_rest(text: str) -> Callable[[Path], None]:
     ("form", "spoil", "expected"),
     [
         ("keys", _table(b"file", b"\xff"), "is not text in UTF-8"),
-        ("keys", _edit("steps.csv", lambda t: b""), "no column of an action"),
+        (
+            "keys",
+            _edit("steps.csv", lambda t: b""),
+            "has neither a header.json nor a column action/NAME",
+        ),
         ("keys", _edit("steps.csv", lambda t: t.splitlines(True)[0]), "There is nothing to import"),
         ("keys", _edit("steps.csv", lambda t: t + b'"open'), "is not valid CSV"),
         ("keys", _table(b"backward", b"forward"), "two columns of one name"),
@@ -226,12 +226,11 @@ def test_folders_of_unknown_format(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     assert "nothing that can be imported" in refused(tmp_path / "empty", out)
     (tmp_path / "file").write_text("x")
-    assert "is a file: give the folder" in refused(tmp_path / "file", out)
+    assert "is a file: give its folder" in refused(tmp_path / "file", out)
     assert "does not exist" in refused(tmp_path / "gone", out)
     drive(tmp_path / "mine")
     assert "is a recording already" in refused(tmp_path / "mine", out)
     tub = tub_folder(tmp_path / "above/tub", [{"user/angle": 0.0, "user/throttle": 0.5}])
-    assert f"{tub} in it is tub." in refused(tmp_path / "above", out)
     (tub / "steps.csv").write_text("steering\n0\n")
     assert "looks like tub and csv" in refused(tub, out)
     assert import_recording(tub, out, "csv").steps == 1
@@ -244,8 +243,6 @@ def test_unknown_formats(tmp_path: Path) -> None:
     assert "is not tub" in refused(tmp_path / "keys", tmp_path / "data", "tub")
     with pytest.raises(UnknownName, match="Did you mean 'csv'"):
         export_recording(drive(tmp_path / "recorded"), tmp_path / "out", "cvs")
-    with pytest.raises(UnknownName):
-        next(import_episodes(tmp_path / "keys", "minary"))
 
 
 def test_invalid_outputs(tmp_path: Path) -> None:
@@ -268,7 +265,7 @@ def test_invalid_outputs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"control_hz": 10.0}, "in its control_hz, but a Minari dataset has one kind"),
+        ({"control_hz": 10.0}, "in its control_hz: export each kind to its own Minari"),
         ({"image_size": (80, 60)}, "in its image_size"),
     ],
 )

@@ -163,7 +163,6 @@ def first_without_picture(data: Path) -> None:
     [
         (lambda data: drive(data, image_size=(41, 32)), {}, "41 x 32 pixels: export them with"),
         (first_without_picture, {}, "no image of step 0"),
-        (lambda data: drive(data), {"dropped": True}, "no option 'dropped'"),
         (
             lambda data: record(
                 data, header(), [(Step(action=(1e39, 0.0), driver="person", state=(0.0,) * 2),

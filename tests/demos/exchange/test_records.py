@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ExchangeEpisode, ImportContext, Record
+from shapechanger.demos.exchange.base import drives, whole_records
 from shapechanger.demos.exchange.files import load_jpeg
-from shapechanger.demos.exchange.format import drives, whole_records
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError
 from tests.demos.exchange.small import findings_of, header, huge, image_file, picture

@@ -10,7 +10,7 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.demos.exchange import formats
-from shapechanger.demos.exchange.format import COLUMNS, FORMATS
+from shapechanger.demos.exchange.base import COLUMNS, FORMATS
 from shapechanger.errors import DemosError
 from tests.demos.exchange.small import all_of
 

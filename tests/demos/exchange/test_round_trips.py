@@ -157,22 +157,6 @@ def test_a_tub_round_trips(tmp_path: Path) -> None:
     assert after.header.control_hz == 10.0
 
 
-def test_dropped_steps_are_not_exported(tmp_path: Path) -> None:
-    steps = [
-        (Step(action=(float(n), 0.0), driver="person", state=(0.0, 0.0)), jpeg)
-        for n, jpeg in enumerate((picture(0), None, None, picture(3)))
-    ]
-    path = record(tmp_path / "data", header(), steps)
-    edit(path, Drop(0, 0, "bad"))
-    done = export_recording(tmp_path / "data", tmp_path / "csv", "csv")
-    assert done.steps == 3
-    assert "Dropped steps are left out (1); --dropped" in findings_of(done)
-    import_recording(tmp_path / "csv", tmp_path / "back")
-    (after,) = all_of(tmp_path / "back")
-    assert [step.action[0] for step in after.kept] == [1.0, 2.0, 3.0]
-    assert [after.jpeg(step) for step in after.kept] == [picture(0), picture(0), picture(3)]
-
-
 def with_a_pause(data: Path) -> Path:
     """Record eight steps, the last four of which come 7 s later and 5 ms slower each."""
     times_ns = [n * 50_000_000 if n < 4 else 7 * 10**9 + n * 80_000_000 for n in range(8)]

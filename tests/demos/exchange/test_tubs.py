@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapechanger.demos.exchange import Converted, import_recording
-from shapechanger.demos.exchange.format import measured_hz
+from shapechanger.demos.exchange.base import measured_hz
 from shapechanger.errors import DemosError, UnknownName
 from tests.demos.exchange.small import all_of, findings_of, picture, tub_folder
 
@@ -75,7 +75,7 @@ def test_deletions_go_by_index(
 
 def test_a_tub_of_version_1_is_converted_by_donkeycar(tmp_path: Path) -> None:
     (tmp_path / "record_3.json").write_text("{}")
-    with pytest.raises(DemosError, match="version 1: Donkeycar's convert_to_tub_v2 converts it"):
+    with pytest.raises(DemosError, match="of version 1: Donkeycar's convert_to_tub_v2 converts it"):
         import_recording(tmp_path, tmp_path.with_name("data"))
 
 
@@ -134,15 +134,12 @@ def in_manifest(old: str, new: str) -> Callable[[Path], object]:
             "line 1, catalog_0.catalog, line 5: damaged JSON, or no valid _index",
             {0, 4},
         ),
-        (field("_index", 2), "record 2: the _index of several records", {0, 2, 4}),
         (field("user/angle", 1.5), "(Expected `float` <= 1.0 - at `$.user/angle`)", {0, 4}),
-        (field("user/angle", True), "got `bool` - at `$.user/angle`)", {0, 4}),
         (field("pilot/angle", math.nan), "invalid value (Expected `float` >= -1.0", {0, 4}),
         (field("_timestamp_ms", "soon"), "got `str` - at `$._timestamp_ms`)", {0, 4}),
         (field("user/throttle", None), "record 0, record 4: no action in the mode 'user'", {0, 4}),
         (field("user/mode", "local"), "no action in the mode 'local'", {0, 4}),
         (field("cam/image_array", None), "record 0, record 4: no image", {0, 4}),
-        (field("cam/image_array", "../1.jpg"), "an image name that leaves the folder", {0, 4}),
         (field("cam/image_array", "a\0b.jpg"), "an image name that leaves the folder", {0, 4}),
         (
             field("cam/image_array", "1_cam_image_array_.jpg"),
@@ -206,17 +203,6 @@ def test_a_damaged_manifest(tmp_path: Path, lines: int) -> None:
         imported(folder)
 
 
-def test_no_record_is_left(tmp_path: Path) -> None:
-    out = tmp_path / "data"
-    with pytest.raises(
-        DemosError, match=r"nothing to import .*: record 0, record 1, record 2: no action"
-    ):
-        import_recording(tub_folder(tmp_path / "a", [{"speed": 1.0}] * 3), out)
-    with pytest.raises(DemosError, match="There is nothing to import"):
-        import_recording(tub_folder(tmp_path / "b", records(3), [0, 1, 2]), out)
-    assert not out.exists()
-
-
 @pytest.mark.parametrize(
     ("period_ms", "stated", "hz", "rate", "finding"),
     [
@@ -227,8 +213,8 @@ def test_no_record_is_left(tmp_path: Path) -> None:
         (52.0, "19.2", None, 19.2, ""),
         (52.0, 20, None, 20.0, ""),
         (52.0, "soon", None, 19.23, ""),
-        (52.0, "50", None, 50.0, "19.23 a second by their times, and not the 50 Hz"),
-        (3.0, None, None, 333.0, "State the rate with --hz"),
+        (52.0, "50", None, 50.0, "19.23 a second, not at 50 Hz: their times are left out"),
+        (3.0, None, None, 333.0, "unlike those of robots: --hz states the rate"),
         (3.0, None, 20.0, 20.0, "3 ms apart"),
     ],
 )
@@ -246,7 +232,7 @@ def test_rates_by_times(
     (episode,) = all_of(next(p for p in tmp_path.iterdir() if p != folder))
     assert episode.header.control_hz == pytest.approx(rate, rel=2e-3)
     assert finding in findings_of(done)
-    if "by their times" in findings_of(done):
+    if "their times are left out" in findings_of(done):
         assert {step.clock_ns for step in episode.steps} == {None}
         assert episode.header.created == ""
     else:  # The ten deleted records took time, too.
@@ -292,7 +278,12 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
         record |= {"_session_id": n // 12, "_timestamp_ms": T0_MS + n * (50 if n < 12 else 100)}
     folder = tub_folder(tmp_path / "tub", made)
     text = findings_of(imported(folder)[1])
-    assert text.startswith("warning: The drives have from 10 to 20 steps a second: a policy learns")
+    assert text == "warning: The drives have from 10 to 20 steps a second."
+    lost = [r if n else {k: v for k, v in r.items() if k[0] != "_"} for n, r in enumerate(made)]
+    first = {"_session_id": 0, "_index": 0}
+    episodes, done = imported(tub_folder(tmp_path / "lost", [lost[0] | first, *lost[1:]]))
+    assert "warning: record 0: some records lack a time" in findings_of(done)
+    assert episodes == [[*range(12)], [*range(12, 24)]]
     with pytest.raises(DemosError, match="--hz must be positive"):
         imported(folder, hz=-1.0)
 
@@ -313,7 +304,7 @@ def test_cameras_of_other_names(tmp_path: Path) -> None:
             (folder / f"images/{n}_right.jpg").write_bytes(picture(9, 48, 32))
         if count == 1:
             assert imported(folder)[1].pictures == 3
-    with pytest.raises(DemosError, match=r"2 cameras \(cam/left, cam/right\).*--camera cam/left"):
+    with pytest.raises(DemosError, match=r"2 cameras: choose one of cam/left, cam/right by"):
         imported(folder)
     _, done = imported(folder, camera="cam/right")
     assert done.pictures == 3

@@ -1,8 +1,8 @@
 """Import and export of recordings in other formats.
 
 A format is one file: it reads folders into `ExchangeEpisode`s, writes these, and declares a
-`Format` (`format`); `formats` finds our own and those of the entry points `shapechanger.formats`.
-`format.COLUMNS` names each column of a step. `files` and `video` load and check what strangers
+`Format` (`base`); `formats` finds our own and those of the entry points `shapechanger.formats`.
+`base.COLUMNS` names each column of a step. `files` and `video` load and check what strangers
 made, within one budget. What is not whole is left out here, with its name and the reason. Sources
 are never changed, and targets appear atomically.
 """
@@ -34,8 +34,7 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.demos.episodes.records import is_episode, longest_period_s
 from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
-from shapechanger.demos.exchange.files import new_folder
-from shapechanger.demos.exchange.format import (
+from shapechanger.demos.exchange.base import (
     ExchangeEpisode,
     ExportContext,
     Finding,
@@ -44,6 +43,7 @@ from shapechanger.demos.exchange.format import (
     Record,
     whole_records,
 )
+from shapechanger.demos.exchange.files import new_folder
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.files import writing
 
@@ -77,10 +77,8 @@ def formats() -> Mapping[str, Format]:
     for point in entry_points(group=_GROUP):
         form = point.load()
         if not isinstance(form, Format) or form.name in found:
-            raise DemosError(
-                f"The entry point {point.name} in {_GROUP} must name a Format of another name than "
-                f"{', '.join(found)}."
-            )
+            text = f"The entry point {point.name} in {_GROUP} must name a Format"
+            raise DemosError(f"{text} of another name than {', '.join(found)}.")
         found[form.name] = form
     return MappingProxyType(found)
 
@@ -146,10 +144,8 @@ def export_recording(
     for episode in episodes:
         for name in form.common:
             if getattr(episode.header, name) != getattr(episodes[0].header, name):
-                raise DemosError(
-                    f"{episode.name} differs from {episodes[0].name} in its {name}, but a "
-                    f"{form.title} dataset has one kind of episode: export each kind to its own."
-                )
+                text = f"{episode.name} differs from {episodes[0].name} in its {name}"
+                raise DemosError(f"{text}: export each kind to its own {form.title} dataset.")
     rewarded = all(step.reward is not None for episode in read for step in episode.kept)
     context = ExportContext(out=out, task=task, images=images, rewarded=rewarded)
     try:
@@ -168,9 +164,8 @@ def _require_options(form: Format, **given: object) -> None:
     for option, value in given.items():
         if value and option not in form.options:
             takes = [name for name, other in formats().items() if option in other.options]
-            raise DemosError(
-                f"The format {form.name} has no option {option!r}, unlike {', '.join(takes)}."
-            )
+            known = ", ".join(takes)
+            raise DemosError(f"The format {form.name} has no option {option!r}, unlike {known}.")
 
 
 def _exchanged(
@@ -238,14 +233,11 @@ def _passed_s(one: Step, two: Step, unknown_s: float = 0.0) -> float:
     return unknown_s
 
 
-def import_episodes(
-    path: Path, format: str = "auto", context: ImportContext | None = None
-) -> Iterator[ExchangeEpisode]:
+def import_episodes(path: Path, context: ImportContext | None = None) -> Iterator[ExchangeEpisode]:
     """Read a recording in another format, without writing anything.
 
     Args:
         path: A folder in one of the `formats`.
-        format: Name of one of them, or "auto" to detect it.
         context: Options; it collects the findings. None to refuse a source that is incomplete or
             contradicts itself.
 
@@ -254,10 +246,9 @@ def import_episodes(
 
     Raises:
         DemosError: If something is damaged or missing, possibly not before it is read.
-        UnknownName: If there is no such format.
         MissingExtra: If a package that the format needs is not installed.
     """
-    yield from _read(path, format, context or ImportContext(strict=True))[1]
+    yield from _read(path, "auto", context or ImportContext(strict=True))[1]
 
 
 def import_recording(
@@ -331,20 +322,16 @@ def find_format(path: Path) -> str:
         return found[0]
     if found:
         raise DemosError(f"{path} looks like {' and '.join(found)}: choose with --format.")
-    children = sorted(path.iterdir())
-    if any(map(is_episode, (path, *children))):
+    if any(map(is_episode, (path, *path.iterdir()))):
         raise DemosError(f"{path} is a recording already: use it as it is.")
-    for child in children:
-        if child.is_dir() and (below := _formats_of(child)):
-            raise DemosError(f"{path} has none of the formats, but {child} in it is {below[0]}.")
     signs = [f"{form.sign} ({name})" for name, form in formats().items() if form.read]
     raise DemosError(f"{path} has nothing that can be imported: expected {' or '.join(signs)}.")
 
 
 def _formats_of(path: Path) -> list[str]:
     if not path.is_dir():
-        where = f"is a file: give the folder that it is in, {path.parent}"
-        raise DemosError(f"{path} {where if path.exists() else 'does not exist'}.")
+        where = "is a file: give its folder" if path.exists() else "does not exist"
+        raise DemosError(f"{path} {where}.")
     return [name for name, form in formats().items() if form.detect and form.detect(path)]
 
 

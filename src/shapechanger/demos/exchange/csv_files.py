@@ -22,36 +22,25 @@ from typing import Any, Final
 import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files
-from shapechanger.demos.exchange.format import (
-    COLUMNS,
-    COMMANDS,
-    ExchangeEpisode,
-    ExportContext,
-    Format,
-    ImportContext,
-    Record,
-    as_json,
-    drives,
-    features_of,
-    value_names,
-)
+from shapechanger.demos.exchange import base, files
 from shapechanger.errors import DemosError
 
 _TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
 _FRAMES: Final = "frames"
-_NAMES: Final = {field: names["csv"] for field, names in COLUMNS.items()}
+_NAMES: Final = {field: names["csv"] for field, names in base.COLUMNS.items()}
 _VECTORS: Final = [field for field, name in _NAMES.items() if name.endswith("/")]
 _IN_JSON: Final = ("terms", "stop_reason", "marks", "dropped")
 _KNOWN_AS: Final = {
-    **{key: (_NAMES["action"] + one.name, 1) for key, one in COMMANDS.items()},
+    **{key: (_NAMES["action"] + one.name, 1) for key, one in base.COMMANDS.items()},
     **dict.fromkeys(("file", "image", "picture", "filename"), ("frame", 1)),
     **dict.fromkeys(("timestamp", "time"), ("captured_ns", 10**9)),
     **dict.fromkeys(("timestamp_ms", "milliseconds"), ("captured_ns", 10**6)),
     "done": ("terminated", 1),
 }
 """Columns of `steps.csv`, each with its factor to their unit, by names in tables of others."""
+
+_Table = list[tuple[int, list[str]]]  # Lines with their numbers.
 
 _Columns = Mapping[str, Sequence[str]]  # The names of the columns of each field of a step.
 
@@ -64,20 +53,20 @@ def _tables_of(folder: Path) -> list[Path]:
 
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
-    actions, states = value_names(header.actions), value_names(header.states)
+    actions, states = base.value_names(header.actions), base.value_names(header.states)
     values = dict.fromkeys(_VECTORS, actions) | {"state": states}
     return {
         field: [name + value for value in values.get(field, [""])] for field, name in _NAMES.items()
     }
 
 
-def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
+def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.ExportContext) -> int:
     """Write episodes; several episodes get a subfolder each."""
     steps = 0
     for number, episode in enumerate(episodes, 1):
         place = folder if len(episodes) == 1 else folder / f"episode-{number:04d}"
         (place / _FRAMES).mkdir(parents=True)
-        own = files.own_fields(episode.header, episode.outcome)
+        own = episode.header.to_json() | {"outcome": episode.outcome}
         text = json.dumps(own, indent=1, ensure_ascii=False)
         (place / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
         columns, frame, shown = _columns(episode.header), "", None
@@ -93,7 +82,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
     return steps
 
 
-def _cells(record: Record, columns: _Columns) -> Iterator[str]:
+def _cells(record: base.Record, columns: _Columns) -> Iterator[str]:
     """Yield the cells of a step after those of its index, image and driver."""
     for field, names in list(columns.items())[3:]:
         value: Any = getattr(record if field in {"marks", "dropped"} else record.step, field)
@@ -110,7 +99,7 @@ def _cells(record: Record, columns: _Columns) -> Iterator[str]:
             yield "" if value is None else repr(value).lower()
 
 
-def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEpisode]:
     for place in _tables_of(folder):
         path = place / _TABLE
         (_, names), *lines = files.read_table(path) or [(1, [])]
@@ -120,8 +109,8 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
 
 
 def _own(
-    path: Path, names: list[str], lines: list[tuple[int, list[str]]], context: ImportContext
-) -> Iterator[ExchangeEpisode]:
+    path: Path, names: list[str], lines: _Table, context: base.ImportContext
+) -> Iterator[base.ExchangeEpisode]:
     if context.hz is not None:
         raise DemosError("The format csv states the rate itself: leave out --hz.")
     where, own = path.parent / _HEADER, files.read_json(path.parent / _HEADER)
@@ -134,12 +123,14 @@ def _own(
     records = _records(path.parent / _FRAMES, names, lines, columns, None)
     if header.image_size is None and any(record.frame for record in records):
         raise DemosError(f"{path} has images, but {where} has no image_size.")
-    yield ExchangeEpisode(header=header, records=records, name=str(path.parent), outcome=outcome)
+    yield base.ExchangeEpisode(
+        header=header, records=records, name=str(path.parent), outcome=outcome
+    )
 
 
 def _others(
-    path: Path, stated: list[str], lines: list[tuple[int, list[str]]], context: ImportContext
-) -> Iterator[ExchangeEpisode]:
+    path: Path, stated: list[str], lines: _Table, context: base.ImportContext
+) -> Iterator[base.ExchangeEpisode]:
     """Yield the episodes of a table without a header."""
     known = dict(_KNOWN_AS.get(name.lower(), (name, 1)) for name in stated)
     columns = {
@@ -147,10 +138,8 @@ def _others(
         for field, name in _NAMES.items()
     }
     if not columns["action"]:
-        raise DemosError(
-            f"There is no {_HEADER} next to {path}, and no column of an action: restore it, "
-            f"or name columns action/NAME, or {', '.join(COMMANDS)}."
-        )
+        names = ", ".join(base.COMMANDS)
+        raise DemosError(f"{path} has neither a {_HEADER} nor a column action/NAME, or {names}.")
     if len(known) < len(stated):
         raise DemosError(f"{path} has two columns of one name: rename one of them.")
     if others := known.keys() - set(chain.from_iterable(columns.values())):
@@ -158,29 +147,33 @@ def _others(
     layouts: list[str] = []
     for field in ("action", "state"):
         values = [name.removeprefix(_NAMES[field]) for name in columns[field]]
-        layouts.append(as_json([COMMANDS.get(name) or features_of(name, 1)[0] for name in values]))
+        layouts.append(
+            base.as_json(
+                [base.COMMANDS.get(name) or base.features_of(name, 1)[0] for name in values]
+            )
+        )
     header = EpisodeHeader(action_layout=layouts[0], state_layout=layouts[1], source="csv")
     records = _records(path.parent, list(known), lines, columns, known)
-    for part, head in drives([records], header, context):
+    for part, head in base.drives([records], header, context):
         name = f"{path.parent}, from {part[0].name}"
-        yield ExchangeEpisode(header=head, records=part, name=name)
+        yield base.ExchangeEpisode(header=head, records=part, name=name)
 
 
 def _records(
     folder: Path,
     names: Sequence[str],
-    lines: Sequence[tuple[int, list[str]]],
+    lines: _Table,
     columns: _Columns,
     factors: Mapping[str, int] | None,
-) -> list[Record]:
+) -> list[base.Record]:
     """Return the lines of a table with their images.
 
     An own table has no `factors` of columns, and the tables of others may lack columns.
     """
-    records: list[Record] = []
+    records: list[base.Record] = []
     shown, known, last = "", set[str](), -1
     for position, (line, cells) in enumerate(lines):
-        record = Record(step=Step(action=(), driver="person"), number=position)
+        record = base.Record(step=Step(action=(), driver="person"), number=position)
         record.name = f"line {line} of {folder.parent.name if factors is None else folder.name}"
         records.append(record)
         try:
@@ -207,7 +200,10 @@ def _records(
 
 
 def _fill(
-    record: Record, cells: Mapping[str, str], columns: _Columns, factors: Mapping[str, int] | None
+    record: base.Record,
+    cells: Mapping[str, str],
+    columns: _Columns,
+    factors: Mapping[str, int] | None,
 ) -> str:
     """Fill a record from the cells of a line, and return the name of its image."""
     fields: dict[str, Any] = {} if factors is None else {"driver": "person"}
@@ -240,7 +236,7 @@ def _fill(
     return frame or ""
 
 
-FORMAT: Final = Format(
+FORMAT: Final = base.Format(
     name="csv",
     title="CSV",
     sign=_TABLE,

@@ -95,13 +95,7 @@ def is_inside(folder: Path, name: str) -> bool:
 
 
 def inside(folder: Path, name: str, named_by: object) -> Path:
-    """Return the path of a regular file inside a folder.
-
-    Args:
-        folder: The folder.
-        name: Name of the file according to the dataset.
-        named_by: Where the dataset has the name, such as "steps.csv, line 3".
-    """
+    """Return the path of a regular file inside a folder, which a file of the dataset names."""
     if not name or not is_inside(folder, name):
         raise DemosError(f"{named_by}: the name {name!r} leaves the folder.")
     if not (folder / name).is_file():
@@ -173,9 +167,7 @@ def load_jpeg(
     except Exception as error:  # Pillow's errors have no common base.
         raise DemosError("a damaged image") from error
     if pixels is None:
-        raise DemosError(
-            f"an image that is partly transparent, or of more than {MAX_PIXELS} pixels"
-        )
+        raise DemosError(f"an image that is partly transparent, or above {MAX_PIXELS} pixels")
     return data if is_jpeg else encode_picture(pixels), (pixels.shape[1], pixels.shape[0])
 
 
@@ -211,15 +203,10 @@ def read_json(path: Path, kind: Any = dict[str, Any]) -> Any:
 
 
 class _Own(msgspec.Struct):
-    """Our own part of a dataset: the header of each episode, with its outcome."""
+    """Our own part of a dataset: the fields of each header, with the outcome and drivers."""
 
     format: Literal[1]
     episodes: list[dict[str, Any]]
-
-
-def own_fields(header: EpisodeHeader, outcome: str) -> dict[str, Any]:
-    """Return the fields of an exported episode that `own_episodes` reads."""
-    return header.to_json() | {"outcome": outcome}
 
 
 def own_episodes(
@@ -227,11 +214,7 @@ def own_episodes(
 ) -> list[tuple[EpisodeHeader, str, list[Driver]]]:
     """Return the header, the outcome and the drivers of each episode that Shapechanger exported.
 
-    Args:
-        section: Our own section of a dataset.
-        where: How to name it in errors.
-        count: Number of episodes in the dataset.
-        found: What the rest of the dataset says, whose sizes must be the same.
+    The section must fit the number of episodes, and the sizes that the rest of the dataset has.
     """
     own: _Own = converted(section, _Own, where)
     episodes: list[tuple[EpisodeHeader, str, list[Driver]]] = []

@@ -27,17 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import Driver, EpisodeHeader, Step
-from shapechanger.demos.exchange import files
-from shapechanger.demos.exchange.format import (
-    COLUMNS,
-    ExchangeEpisode,
-    Format,
-    ImportContext,
-    Record,
-    as_json,
-    choose_camera,
-    features_of,
-)
+from shapechanger.demos.exchange import base, files
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, write
 from shapechanger.demos.exchange.video import VideoTimes, read_pictures, read_times
 from shapechanger.demos.jpeg import MAX_PIXELS
@@ -45,7 +35,7 @@ from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 
 _ACTION, _STATE, _REWARD, _TERMINATED = (
-    COLUMNS[field]["lerobot"] for field in ("action", "state", "reward", "terminated")
+    base.COLUMNS[field]["lerobot"] for field in ("action", "state", "reward", "terminated")
 )
 # Largest difference between the time of a step and that of its image, s: `tolerance_s` of lerobot
 # 0.4.4. Rounding to 32 bits and to the ticks of the video is allowed in addition.
@@ -128,7 +118,7 @@ class _Entry(msgspec.Struct, kw_only=True):
 class _Dataset:
     """A dataset that is read."""
 
-    def __init__(self, folder: Path, context: ImportContext) -> None:
+    def __init__(self, folder: Path, context: base.ImportContext) -> None:
         self._folder = folder
         self._context = context
         self._path = folder / INFO
@@ -153,7 +143,7 @@ class _Dataset:
         for entry in self._entries.values():
             self._filmed[self._video_name(entry)].append(entry)
 
-    def read(self) -> Iterator[ExchangeEpisode]:
+    def read(self) -> Iterator[base.ExchangeEpisode]:
         """Yield the episodes whose keys agree; the others are reported."""
         notes = {"dataset": self._folder.resolve().name}
         header = EpisodeHeader(
@@ -174,7 +164,7 @@ class _Dataset:
             clock = "real" if head.clock == "none" else head.clock  # Times come from the dataset.
             head = replace(head, clock=clock, notes=header.notes | task | head.notes)
             records, name = self._records(entry, drivers), f"episode {number}"
-            yield ExchangeEpisode(header=head, records=records, name=name, outcome=outcome)
+            yield base.ExchangeEpisode(header=head, records=records, name=name, outcome=outcome)
 
     def _choose_features(self, features: Sequence[_Feature]) -> None:
         """Choose the action, the states, the camera and single numbers, and report the others."""
@@ -189,7 +179,7 @@ class _Dataset:
         self._columns = {_REWARD, DONE, _TERMINATED} & single
         cameras = {f.key.removeprefix(_CAMERAS): f for f in features if f.role == "picture"}
         context.camera = context.camera.removeprefix(_CAMERAS)
-        self._camera = cameras.get(choose_camera(self._folder, list(cameras), context))
+        self._camera = cameras.get(base.choose_camera(self._folder, list(cameras), context))
         taken = {_ACTION, *(f.key for f in self._states), *self._columns, *_KEYS, "task_index"}
         for feature in features:
             if feature.key not in taken and feature is not self._camera:
@@ -298,7 +288,7 @@ class _Dataset:
             raise DemosError(f"{name} lacks an image at the time of a step.")
         return read_pictures(self._folder / name, times, times.ticks[nearest])
 
-    def _records(self, entry: _Entry, drivers: Sequence[Driver]) -> Iterator[Record]:
+    def _records(self, entry: _Entry, drivers: Sequence[Driver]) -> Iterator[base.Record]:
         """Yield the records of an episode; refuse rows with other keys than expected."""
         number, rate_hz = entry.episode_index, self._info.fps
         sizes = {f.key: f.size for f in (self._action, *self._states)}
@@ -336,7 +326,7 @@ class _Dataset:
                     read = image
                     if self._most_bytes < 0:
                         raise DemosError(f"{path} has images of far more bytes than its files.")
-                yield Record(
+                yield base.Record(
                     name=f"step {frame} of episode {number}",
                     step=Step(
                         action=tuple(columns[_ACTION][row].tolist()),
@@ -375,7 +365,7 @@ def _flat_names(plain: Any) -> tuple[str, ...]:
     return tuple(map(str, cast("list[Any]", plain))) if isinstance(plain, list) else ()
 
 
-def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
+def _layout(features: Sequence[_Feature], context: base.ImportContext) -> str:
     """Return a layout for the values of features, in order, with their names and units."""
     found: list[Feature] = []
     for feature in features:
@@ -386,8 +376,8 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
             text = f"The names of {feature.key} do not fit its {size} values: numbers do."
             context.report("note", text)
             names = []
-        found += features_of(key, size, names=names, units=_flat_names(feature.units))
-    return as_json(found)
+        found += base.features_of(key, size, names=names, units=_flat_names(feature.units))
+    return base.as_json(found)
 
 
 def _batches(
@@ -415,7 +405,7 @@ def _batches(
             for group in range(about.num_row_groups) if groups is None else sorted(groups):
                 for batch in file.iter_batches(rows, row_groups=[group], columns=columns):
                     yield group, batch
-    except (arrow.ArrowException, OSError) as error:
+    except (arrow.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
         raise DemosError(f"{path} is not an intact Parquet file: {reason}.") from error
 
@@ -429,7 +419,7 @@ def _vectors(batch: Any, key: str, size: int, path: Path) -> NDArray[np.float64]
         raise DemosError(f"{path}: {key!r} does not have {size} numbers in each row.") from error
 
 
-FORMAT: Final = Format(
+FORMAT: Final = base.Format(
     name="lerobot",
     title="LeRobot",
     sign=INFO,

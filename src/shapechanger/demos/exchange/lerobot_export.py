@@ -29,14 +29,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.files import library, own_fields
-from shapechanger.demos.exchange.format import (
+from shapechanger.demos.exchange.base import (
     COLUMNS,
     ExchangeEpisode,
     ExportContext,
     decoded_images,
     value_names,
 )
+from shapechanger.demos.exchange.files import library
 from shapechanger.demos.exchange.video import VideoWriter
 from shapechanger.errors import DemosError
 
@@ -132,7 +132,8 @@ class _Dataset:
         self._parts += parts
         self._levels += levels
         runs = [[driver, len(list(group))] for driver, group in groupby(drivers)]
-        self._headers.append(own_fields(header, episode.outcome) | {"drivers": runs})
+        about = {"outcome": episode.outcome, "drivers": runs}
+        self._headers.append(header.to_json() | about)
         self.steps += count
 
     def _new_video(self) -> VideoWriter:

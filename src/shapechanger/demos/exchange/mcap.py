@@ -24,8 +24,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from shapechanger.demos.exchange.base import ExchangeEpisode, ExportContext, Format, Record
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.format import ExchangeEpisode, ExportContext, Format, Record
 from shapechanger.layout import Layout
 
 _NS_PER_S: Final = 10**9

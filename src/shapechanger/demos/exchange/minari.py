@@ -32,21 +32,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files
+from shapechanger.demos.exchange import base, files
 from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library
-from shapechanger.demos.exchange.format import (
-    COLUMNS,
-    DEFAULT_HZ,
-    ExchangeEpisode,
-    ExportContext,
-    Format,
-    ImportContext,
-    Record,
-    as_json,
-    decoded_images,
-    features_of,
-    few,
-)
 from shapechanger.demos.jpeg import MAX_PIXELS, is_grey
 from shapechanger.errors import DemosError, translate_errors
 from shapechanger.layout import Feature
@@ -57,7 +44,8 @@ _MAIN: Final = "main_data.hdf5"
 _OURS: Final = "shapechanger"  # Key of our own section in `metadata.json`.
 _OBSERVATIONS, _FRAME = "observations", "infos/frame"
 _ACTION, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
-    COLUMNS[field]["minari"] for field in ("action", "reward", "terminated", "truncated", "driver")
+    base.COLUMNS[field]["minari"]
+    for field in ("action", "reward", "terminated", "truncated", "driver")
 )
 _IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys left out of `infos/step`.
 _STORAGE: Final = "minari.dataset.minari_storage"
@@ -155,9 +143,9 @@ def _data_folder(folder: Path) -> Path | None:
 @contextmanager
 def _opened(path: Path) -> Generator[Any]:
     """Open an HDF5 file for reading; h5py raises one of these errors for inconsistent bytes."""
-    wrong = f"{path} is not an intact HDF5 file"
+    kinds, wrong = (OSError, RuntimeError, KeyError), f"{path} is not an intact HDF5 file"
     with (
-        translate_errors(OSError, RuntimeError, to=lambda error: DemosError(f"{wrong}: {error}.")),
+        translate_errors(*kinds, to=lambda error: DemosError(f"{wrong}: {error}.")),
         library("h5py").File(path, "r") as file,
     ):
         yield file
@@ -180,7 +168,7 @@ def _arrays(file: Any, number: int) -> dict[str, Any]:
 class _Dataset:
     """A dataset that is read."""
 
-    def __init__(self, folder: Path, context: ImportContext) -> None:
+    def __init__(self, folder: Path, context: base.ImportContext) -> None:
         place = _data_folder(folder) or folder
         self._path = path = place / _METADATA
         self._context = context
@@ -208,14 +196,13 @@ class _Dataset:
             raise DemosError(f"{path}: the action_space must consist of {names} of few values.")
         hz = about.control_hz or context.hz
         if hz is None or not 0.0 < hz < math.inf:
-            text = f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it."
-            context.report("note", text)
+            context.report("note", base.UNKNOWN_RATE)
             hz = None
         self._header = EpisodeHeader(
-            action_layout=as_json(list(chain(*actions.values()))),
-            state_layout=as_json(list(chain(*states.values()))),
+            action_layout=base.as_json(list(chain(*actions.values()))),
+            state_layout=base.as_json(list(chain(*states.values()))),
             image_size=next(iter(images.values()), None),
-            control_hz=hz or DEFAULT_HZ,
+            control_hz=hz or base.DEFAULT_HZ,
             clock="none",
             source="minari",
             notes={"dataset": about.dataset_id, "rate_is_known": hz is not None},
@@ -250,10 +237,12 @@ class _Dataset:
                     self._context.report("left out", reason, about)
                     continue
                 low, high = (np.broadcast_to(np.ravel(end).astype(float), size) for end in ends)
-                found[part + at] = features_of(name, size, low=low.tolist(), high=high.tolist())
+                found[part + at] = base.features_of(
+                    name, size, low=low.tolist(), high=high.tolist()
+                )
         return found
 
-    def read(self) -> Iterator[ExchangeEpisode]:
+    def read(self) -> Iterator[base.ExchangeEpisode]:
         """Yield the episodes."""
         with _opened(self._main) as file:
             if (groups := sum(name.startswith("episode_") for name in file)) != self._count:
@@ -262,7 +251,7 @@ class _Dataset:
         for number in range(self._count):
             header, outcome, _ = self._own[number] if self._own else (self._header, "", None)
             records, name = self._records(number), f"episode_{number} of {_MAIN}"
-            yield ExchangeEpisode(header=header, records=records, name=name, outcome=outcome)
+            yield base.ExchangeEpisode(header=header, records=records, name=name, outcome=outcome)
 
     def _columns(self, file: Any, number: int) -> dict[str, Any]:
         """Return the columns of an episode; refuse columns that do not fit together."""
@@ -275,7 +264,7 @@ class _Dataset:
             raise DemosError(f"{where} has no {missing[0]!r} that is an array in this file.")
         others = sorted(name for name in arrays if name.startswith("infos/"))
         if others and not self._own:
-            self._context.report("note", f"The infos are not imported: {few(others)}.")
+            self._context.report("note", f"The infos are not imported: {base.few(others)}.")
         columns = {name: arrays[name] for name in names}
         steps = len(columns[_TERMINATED])
         for name, one in columns.items():
@@ -302,7 +291,7 @@ class _Dataset:
             raise DemosError(f"{_MAIN} claims at least {self._claimed} values, but is smaller.")
         return columns
 
-    def _records(self, number: int) -> Iterator[Record]:
+    def _records(self, number: int) -> Iterator[base.Record]:
         with _opened(self._main) as file:
             columns = self._columns(file, number)
             steps, size = len(columns[_TERMINATED]), sum(one.nbytes for one in columns.values())
@@ -319,7 +308,7 @@ class _Dataset:
                     record.name = name
                     yield record
 
-    def _record(self, row: Mapping[str, Any], number: int) -> Record:
+    def _record(self, row: Mapping[str, Any], number: int) -> base.Record:
         (reward,) = _numbers(row, [_REWARD])
         fields: dict[str, Any] = {"driver": "expert", "truncated": bool(row[_TRUNCATED])}
         rest = _Rest(step=fields, marks=(), dropped=None)
@@ -329,7 +318,7 @@ class _Dataset:
             rest.step["reward"] = reward
         action, state = (_numbers(row, names) for names in (self._action, self._state))
         known = {"action": action, "state": state, "terminated": bool(row[_TERMINATED])}
-        record = Record(step=Step.from_json(rest.step | known))
+        record = base.Record(step=Step.from_json(rest.step | known))
         record.marks, record.dropped = rest.marks, rest.dropped
         if self._image:
             record.frame, stored = int(row.get(_FRAME, number)), row[self._image]
@@ -347,7 +336,9 @@ def _last_colours(stored: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.repeat(pixels, 3 // pixels.shape[-1], -1)
 
 
-def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
+def _write(
+    episodes: Sequence[base.ExchangeEpisode], folder: Path, context: base.ExportContext
+) -> int:
     """Write episodes into an existing folder, as one dataset, and return the number of steps."""
     name = context.out.name
     if not _NAME.fullmatch(name):
@@ -375,7 +366,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
                 group.attrs["seed"] = episode.header.seed
             drivers.update(step.driver for step in steps)
             total += len(steps)
-    own = [files.own_fields(episode.header, episode.outcome) for episode in episodes]
+    own = [episode.header.to_json() | {"outcome": episode.outcome} for episode in episodes]
     about: dict[str, Any] = {
         "dataset_id": name,
         "minari_version": version("minari"),
@@ -400,7 +391,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
     return total
 
 
-def _space_of(episode: ExchangeEpisode, grey: bool) -> spaces.Space[Any]:
+def _space_of(episode: base.ExchangeEpisode, grey: bool) -> spaces.Space[Any]:
     """Return the space of all observations."""
     header, found = episode.header, dict[str, spaces.Space[Any]]()
     if header.image_size is not None:
@@ -417,7 +408,7 @@ def _space_of(episode: ExchangeEpisode, grey: bool) -> spaces.Space[Any]:
     return spaces.Dict(found) if len(found) > 1 else next(iter(found.values()))
 
 
-def _write_episode(group: Any, episode: ExchangeEpisode, grey: bool) -> list[Step]:
+def _write_episode(group: Any, episode: base.ExchangeEpisode, grey: bool) -> list[Step]:
     """Write the columns of an episode to its group, and return its steps.
 
     The last observation is repeated. An episode without an end is truncated at its last step, so
@@ -438,7 +429,7 @@ def _write_episode(group: Any, episode: ExchangeEpisode, grey: bool) -> list[Ste
 
     images = column(image_at, h5py.vlen_dtype(np.uint8)) if has_images else None
     jpeg, frame = b"", -1
-    for record, pixels in decoded_images(episode, "Minari"):
+    for record, pixels in base.decoded_images(episode, "Minari"):
         if pixels is not None:
             frame, jpeg = frame + 1, record.jpeg or b""
             where = f"of step {len(steps)} of {episode.name}"
@@ -469,7 +460,7 @@ def _write_episode(group: Any, episode: ExchangeEpisode, grey: bool) -> list[Ste
     return steps
 
 
-FORMAT: Final = Format(
+FORMAT: Final = base.Format(
     name="minari",
     title="Minari",
     sign=f"{_DATA}/{_METADATA}",

@@ -31,21 +31,7 @@ import msgspec
 from msgspec import Meta, Struct, field, structs
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files
-from shapechanger.demos.exchange.format import (
-    COLUMNS,
-    COMMANDS,
-    ExchangeEpisode,
-    ExportContext,
-    Format,
-    ImportContext,
-    Record,
-    as_json,
-    choose_camera,
-    drives,
-    features_of,
-    few,
-)
+from shapechanger.demos.exchange import base, files
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
@@ -53,9 +39,9 @@ _MANIFEST: Final = "manifest.json"
 _IMAGES: Final = "images"
 _LOOP_HZ: Final = "DRIVE_LOOP_HZ"  # Donkeycar's name of the rate.
 _IMAGE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
-_ACTIONS: Final = Layout((COMMANDS["steering"], COMMANDS["throttle"]))
+_ACTIONS: Final = Layout((base.COMMANDS["steering"], base.COMMANDS["throttle"]))
 _USER, _PILOT = ([f"{who}/{axis}" for axis in ("angle", "throttle")] for who in ("user", "pilot"))
-_IMAGE, _MODE = COLUMNS["frame"]["tub"], COLUMNS["driver"]["tub"]
+_IMAGE, _MODE = base.COLUMNS["frame"]["tub"], base.COLUMNS["driver"]["tub"]
 _CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
@@ -93,7 +79,9 @@ def _is_tub(folder: Path) -> bool:
     return (folder / _MANIFEST).is_file() or any(folder.glob("record_*.json"))
 
 
-def _catalogued(folder: Path, catalogs: _Catalogs, context: ImportContext) -> dict[int, Fields]:
+def _catalogued(
+    folder: Path, catalogs: _Catalogs, context: base.ImportContext
+) -> dict[int, Fields]:
     """Return the fields of the records in the catalogs, by their `_index`, in its order."""
     found: dict[int, list[Fields]] = {}
     for name in catalogs.paths:
@@ -118,7 +106,7 @@ def _catalogued(folder: Path, catalogs: _Catalogs, context: ImportContext) -> di
     if (missing := last + 1 - len(numbers)) > 0:
         context.report("note", f"{missing} of the records 0 to {last} are in no catalog.")
     if strange := [number for number in catalogs.deleted_indexes if number > last]:
-        text = f"{len(strange)} of the deleted indexes belong to no record: {few(strange)}."
+        text = f"{len(strange)} of the deleted indexes belong to no record: {base.few(strange)}."
         context.report("warning", text)
     for number in numbers:
         if len(found[number]) > 1:
@@ -126,13 +114,11 @@ def _catalogued(folder: Path, catalogs: _Catalogs, context: ImportContext) -> di
     return {number: found[number][0] for number in numbers if len(found[number]) == 1}
 
 
-def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEpisode]:
     """Yield the episodes of a tub: its sessions, divided at pauses and where time jumps."""
     path = folder / _MANIFEST
     if not path.is_file():
-        raise DemosError(
-            f"{folder} is a tub of version 1: Donkeycar's convert_to_tub_v2 converts it."
-        )
+        raise DemosError(f"{folder} is of version 1: Donkeycar's convert_to_tub_v2 converts it.")
     lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
     kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
     inputs, kinds_of_inputs, metadata, _, catalogs = (
@@ -150,7 +136,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     there = list(dict.fromkeys(name for fields in kept.values() for name in fields))
     cameras = [name for name in there if types.get(name) in _PICTURES or name == _IMAGE]
     camera = _IMAGE if _IMAGE in cameras and not context.camera else ""
-    camera = camera or choose_camera(folder, cameras, context)
+    camera = camera or base.choose_camera(folder, cameras, context)
     if not camera and _DEPTH in map(types.get, there):
         text = "The steps have no images, because those of 16 bits are not imported."
         context.report("warning", text)
@@ -159,20 +145,22 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
     if left := [n for n in there if n not in taken and not n.startswith("_")]:
         context.report("note", f"Columns that are not imported: {', '.join(left)}.")
-    records = [_record(number, fields, sensed, camera) for number, fields in kept.items()]
+    records = [_record(number, fields, sensed) for number, fields in kept.items()]
     if camera:
-        _find_pictures(records, folder / _IMAGES, context)
+        _find_images(records, [one.get(camera) for one in kept.values()], folder, context)
     sessions = {number: str(fields.get("_session_id", "")) for number, fields in kept.items()}
     parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
     header = EpisodeHeader(
         action_layout=_ACTIONS.to_json(),
-        state_layout=as_json([feature for name in sensed for feature in features_of(name, 1)]),
+        state_layout=base.as_json(
+            [feature for name in sensed for feature in base.features_of(name, 1)]
+        ),
         body="car",
         source="tub",
     )
     rate = _float(dict(metadata).get(_LOOP_HZ))
     stated_hz = rate if 0.0 < rate < math.inf else None
-    for part, head in drives(parts, header, context, stated_hz):
+    for part, head in base.drives(parts, header, context, stated_hz):
         if head.clock == "real":
             for record in part:
                 record.step = structs.replace(record.step, wall_ns=record.step.captured_ns)
@@ -181,7 +169,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         if session := sessions[part[0].number]:
             head = replace(head, notes={"session": session})
         name = f"{folder}, from {part[0].name}"
-        yield ExchangeEpisode(header=head, records=part, name=name)
+        yield base.ExchangeEpisode(header=head, records=part, name=name)
 
 
 def _float(value: Any) -> float:
@@ -191,7 +179,7 @@ def _float(value: Any) -> float:
     return math.nan
 
 
-def _record(number: int, fields: Fields, sensed: Sequence[str], camera: str) -> Record:
+def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.Record:
     """Return a record; it has a fault if it has no valid action."""
     known, fault = _Record(), ""
     try:
@@ -213,15 +201,16 @@ def _record(number: int, fields: Fields, sensed: Sequence[str], camera: str) -> 
         state=tuple(_float(fields.get(name)) for name in sensed),
         captured_ns=None if known.time_ms is None else round(known.time_ms * _NS_PER_MS),
     )
-    frame = fields.get(camera)
-    return Record(name=f"record {number}", number=number, step=step, frame=frame, fault=fault)
+    return base.Record(name=f"record {number}", number=number, step=step, fault=fault)
 
 
-def _find_pictures(records: Sequence[Record], images: Path, context: ImportContext) -> None:
-    """Find the image of each record by its name, the `frame`; others get a fault."""
-    shown = Counter(str(record.frame) for record in records if not record.fault)
-    for record in records:
-        name = record.frame
+def _find_images(
+    records: list[base.Record], names: list[Any], folder: Path, context: base.ImportContext
+) -> None:
+    """Find the image of each record by its name; the others get a fault."""
+    images = folder / _IMAGES
+    shown = Counter(str(name) for name, one in zip(names, records, strict=True) if not one.fault)
+    for record, name in zip(records, names, strict=True):
         if record.fault:
             continue
         if not name or not isinstance(name, str):
@@ -229,7 +218,7 @@ def _find_pictures(records: Sequence[Record], images: Path, context: ImportConte
             continue
         # The type "image" may have the whole path on the robot.
         place = PurePath(name).name if PurePath(name).is_absolute() else name
-        record.image = images / place
+        record.frame, record.image = name, images / place
         if not files.is_inside(images, place):
             record.fault = "an image name that leaves the folder"
         elif shown[name] > 1 and record.image.is_file():
@@ -238,7 +227,7 @@ def _find_pictures(records: Sequence[Record], images: Path, context: ImportConte
             context.report("warning", "the image of another number", record.name)
 
 
-def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
+def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.ExportContext) -> int:
     """Write episodes as the sessions of one tub of version 2.
 
     Actions of people, experts and programs are written as `user/...`, those of policies as
@@ -246,10 +235,8 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
     """
     action, states = episodes[0].header.actions, episodes[0].header.states
     if action.names != _ACTIONS.names or states.size != len(states):
-        raise DemosError(
-            f"{episodes[0].name} has the action {', '.join(action.names)}, or a state with arrays, "
-            f"but a tub {', '.join(_ACTIONS.names)} and single numbers: export it to minari or csv."
-        )
+        text = f"a tub has the action {', '.join(_ACTIONS.names)}, and a state of single numbers"
+        raise DemosError(f"{episodes[0].name} does not fit: {text}; export it to minari or csv.")
     state = states.names
     (folder / _IMAGES).mkdir()
     records: list[Fields] = []
@@ -299,7 +286,9 @@ def _fields(step: Step, state: Sequence[str], where: str) -> Fields:
     return fields | {name: value for name, value in known if math.isfinite(value)}
 
 
-def _timed(episode: ExchangeEpisode, began_ns: int) -> Iterator[tuple[Step, bytes | None, int]]:
+def _timed(
+    episode: base.ExchangeEpisode, began_ns: int
+) -> Iterator[tuple[Step, bytes | None, int]]:
     """Yield the steps with their images and ascending Unix times, ns.
 
     Steps of a simulated drive get the times of its clock, because the recorder's times depend on
@@ -327,7 +316,7 @@ def _began(header: EpisodeHeader) -> datetime:
     return datetime.fromtimestamp(0.0, UTC)
 
 
-FORMAT: Final = Format(
+FORMAT: Final = base.Format(
     name="tub",
     title="Donkeycar",
     sign=_MANIFEST,

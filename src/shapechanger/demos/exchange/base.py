@@ -1,10 +1,8 @@
 """Formats of datasets: their declaration, the names of their columns, and records on their way.
 
 A reader yields `ExchangeEpisode`s of `Record`s; `whole_records` leaves out what is not whole. If
-the rate is not stated, `drives` measures it, and splits sessions where time jumps. Times may be
-rounded, and records may be missing, so a median of periods is not the rate: at times in whole
-milliseconds it is off by up to 2 % at 20 Hz. The rate is the mean over the periods near the median,
-each divided by the steps that its records are apart if they are numbered.
+the rate is not stated, `drives` measures it: the mean over the periods near the median, because a
+median of times in whole milliseconds is off by up to 2 % at 20 Hz.
 """
 
 from __future__ import annotations
@@ -68,15 +66,15 @@ _NS_PER_S: Final = 1e9
 _PAUSE_PERIODS: Final = 30.0
 _NEAR: Final = (0.5, 1.5)  # Of the median period; one missing record is 2.
 _MIN_PERIODS: Final = 10  # A shorter drive is not evidence of its rate.
-# Measured rates of one setting differ slightly, those of two settings by at least a third.
-_RATE_RATIO: Final = 1.3
+_RATE_RATIO: Final = 1.3  # Rates of two settings differ by at least a third.
 _SLOWEST_HZ, _FASTEST_HZ = 1.0, 100.0  # As `control_hz` of a profile.
-# A loop that sleeps for the rest of each period, as Donkeycar's, is up to 2 % slower than it was
-# set to, by the time that it takes to wake up.
+# A loop that sleeps for the rest of each period, as Donkeycar's, is up to 2 % slow.
 _WHOLE: Final = ((1.0, 0.005), (5.0, 0.025))
 
 DEFAULT_HZ: Final = 20.0
 """Steps per second of an episode without any information on its rate, Hz."""
+
+UNKNOWN_RATE: Final = f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it."
 
 
 @dataclass(slots=True, kw_only=True)
@@ -269,24 +267,16 @@ def _size_fault(found: tuple[int, int], size: tuple[int, int]) -> str:
 def decoded_images(
     episode: ExchangeEpisode, title: str
 ) -> Iterator[tuple[Record, NDArray[np.uint8] | None]]:
-    """Yield the records for a dataset with an image of one size at every step.
+    """Yield the records of an episode with images of one size at all steps or none.
 
-    Args:
-        episode: The episode.
-        title: How to name the format in errors.
-
-    Yields:
-        The record, and the pixels of its image if it is new, shape (height, width, 3).
+    Each comes with the pixels of its image if it is new, shape (height, width, 3).
     """
-    size = episode.header.image_size
-    shown = None
+    size, shown = episode.header.image_size, None
     for number, record in enumerate(episode.records):
         pixels, where = None, f"of step {number} of {episode.name}"
         if (size is None) != (record.jpeg is None):
             found = "an image" if size is None else "no image"
-            raise DemosError(
-                f"There is {found} {where}: {title} needs images at all steps or none."
-            )
+            raise DemosError(f"There is {found} {where}: {title} needs all images or none.")
         if size is not None and record.jpeg is not None and record.jpeg is not shown:
             shown, pixels = record.jpeg, decode_picture(record.jpeg, where)
             if fault := _size_fault((pixels.shape[1], pixels.shape[0]), size):
@@ -316,13 +306,9 @@ def drives(
 
     Args:
         sessions: Records with their time as `captured_ns`, from one start of the robot to the next.
-        header: Metadata of all drives.
+        header: Metadata of all drives; rate, size of images and clock are filled in.
         context: Collects the findings.
         stated_hz: Steps per second according to the source, if it does state them.
-
-    Yields:
-        Records that follow each other without a pause, and their header with the rate and the size
-        of images; its clock is "none" if times are unknown.
     """
     for record in chain(*sessions):
         if record.image is not None and not record.fault:
@@ -331,7 +317,7 @@ def drives(
             except DemosError as error:
                 record.fault = str(error)
     sizes = Counter(record.size for record in chain(*sessions) if record.size)
-    common = max(sizes, key=sizes.__getitem__, default=None)
+    ((common, _),) = sizes.most_common(1) or [(None, 0)]
     parts: list[list[Record]] = []
     for session in sessions:
         for record in session:
@@ -342,11 +328,8 @@ def drives(
         part = [record for record in session if not record.fault]
         missing = sum(record.step.captured_ns is None for record in part)
         if 0 < missing < len(part):
-            context.report(
-                "warning",
-                "some records lack a time: the times of its session are left out",
-                part[0].name,
-            )
+            text = "some records lack a time: the times of its session are left out"
+            context.report("warning", text, part[0].name)
             _leave_out_times(part)
         parts += [part] if part else []
     header = replace(header, image_size=common)
@@ -378,54 +361,39 @@ def _rates(
     parts: Sequence[list[Record]], context: ImportContext, stated_hz: float | None
 ) -> list[float]:
     """Return the rate of each session; times that contradict the stated one are left out."""
+    timed = [part if part[0].step.captured_ns is not None else [] for part in parts]
     periods_ns = [
         [_passed_ns(a, b) / max(1, b.number - a.number) for a, b in pairwise(part)]
-        for part in parts
-        if part[0].step.captured_ns is not None
+        for part in timed
     ]
     measured = measured_hz([*chain.from_iterable(periods_ns)])
     about = f"{1e3 / (measured or inf):.4g} ms apart, {measured or 0.0:.4g} a second"
     if (hz := context.hz or stated_hz) is not None:
         if measured and not 1.0 / _RATE_RATIO < measured / hz < _RATE_RATIO:
             _leave_out_times(chain(*parts))
-            context.report(
-                "warning" if context.hz is None else "note",
-                f"The records are {about} by their times, and not the {hz:g} Hz that are stated: "
-                "these times are left out.",
-            )
+            text = f"The records are {about}, not at {hz:g} Hz: their times are left out."
+            context.report("warning" if context.hz is None else "note", text)
         return [hz] * len(parts)
     if measured is None:
-        context.report(
-            "note", f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it."
-        )
+        context.report("note", UNKNOWN_RATE)
         return [DEFAULT_HZ] * len(parts)
     each = [(len(part) >= _MIN_PERIODS and measured_hz(part)) or measured for part in periods_ns]
     differ = max(each) > _RATE_RATIO * min(each)
     rates = [_nominal_hz(hz if differ else measured) for hz in each]
     if differ:
-        context.report(
-            "warning",
-            f"The drives have from {min(each):.3g} to {max(each):.3g} steps a second: a policy "
-            "learns from one rate at a time.",
-        )
+        text = f"The drives have from {min(each):.3g} to {max(each):.3g} steps a second."
+        context.report("warning", text)
     elif abs(measured / rates[0] - 1.0) > _WHOLE[0][1]:
-        text = f"The records are {about}, which is taken to be {rates[0]:g} Hz; --hz states another"
-        context.report("note", f"{text} rate.")
+        text = f"The records are {about}, which is taken to be {rates[0]:g} Hz; --hz states it."
+        context.report("note", text)
     if not all(_SLOWEST_HZ <= hz <= _FASTEST_HZ for hz in rates):
-        context.report(
-            "warning",
-            f"The records are {about}, but robots have {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz: "
-            "perhaps a conversion set their times. State the rate with --hz.",
-        )
+        text = f"The records are {about}, unlike those of robots: --hz states the rate."
+        context.report("warning", text)
     return rates
 
 
 def measured_hz(periods_ns: Sequence[float]) -> float | None:
-    """Return the steps per second, without regard to pauses and outliers.
-
-    Args:
-        periods_ns: Times from step to step, ns.
-    """
+    """Return the steps per second by periods in ns, without regard to pauses and outliers."""
     positive = [period for period in periods_ns if period > 0.0]
     if not positive:
         return None
@@ -457,10 +425,7 @@ def features_of(
     low: Sequence[float] = (),
     high: Sequence[float] = (),
 ) -> list[Feature]:
-    """Return the features of the values of a column of others: named, numbered, or one array.
-
-    Without a unit for each value, the unit is unknown: "?".
-    """
+    """Return the features of a column of others: named, numbered, or one array; "?" is no unit."""
     units = units if len(units) == size and all(units) else ("?",) * size
     lows = low or (-inf,) * size
     highs = high or (inf,) * size
@@ -483,8 +448,6 @@ def choose_camera(folder: Path, cameras: Sequence[str], context: ImportContext) 
             raise UnknownName(f"camera of {folder}", context.camera, cameras)
         return context.camera
     if len(cameras) > 1:
-        raise DemosError(
-            f"{folder} has {len(cameras)} cameras ({', '.join(cameras)}), but an episode has one: "
-            f"choose with --camera, such as --camera {cameras[0]}."
-        )
+        names = ", ".join(cameras)
+        raise DemosError(f"{folder} has {len(cameras)} cameras: choose one of {names} by --camera.")
     return "".join(cameras)
