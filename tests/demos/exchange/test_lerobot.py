@@ -207,3 +207,7 @@ def test_our_own_file_must_fit(tmp_path: Path, text: str, message: str) -> None:
         own.write_text(json.dumps(spoilt))
         with pytest.raises(DemosError, match=problem):
             import_recording(tmp_path / "set", tmp_path / "back")
+    runs = {"drivers": [["policy", 1 << 30]]}  # Of no use, and not in memory.
+    own.write_text(json.dumps(about | {"episodes": [about["episodes"][0] | runs]}))
+    import_recording(tmp_path / "set", tmp_path / "back")
+    assert {step.driver for step in all_of(tmp_path / "back")[0].steps} == {"policy"}

@@ -23,7 +23,7 @@ import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange import base, files
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, translate_errors
 
 _TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
@@ -183,19 +183,17 @@ def _records(
             if factors is None and record.step.index <= last:
                 raise ValueError(f"step {record.step.index} is not after the step before")
             last = record.step.index
-        except (ValueError, ArithmeticError, RecursionError, msgspec.ValidationError) as error:
-            record.fault = str(error)
-            continue
-        record.frame, record.image = frame, folder / frame if frame else None
-        if frame and not files.is_inside(folder, frame):
-            record.fault = "an image name that leaves the folder"
-        elif frame != shown and frame in known:
-            record.fault = f"it returns to the image {frame!r} of an earlier step"
-        elif not frame and shown:
-            record.fault = "without an image"
-        else:
+            record.frame, record.image = frame, folder / frame if frame else None
+            if frame and not files.is_inside(folder, frame):
+                raise ValueError("an image name that leaves the folder")
+            if shown and not frame:
+                raise ValueError("no image")
+            if frame != shown and frame in known:
+                raise ValueError(f"it returns to the image {frame!r} of an earlier step")
             shown = frame
             known.add(frame)
+        except (ValueError, RecursionError, msgspec.ValidationError) as error:
+            record.fault = str(error)
     return records
 
 
@@ -218,10 +216,9 @@ def _fill(
         elif field in _IN_JSON:
             fields[field] = json.loads(values[0])
         elif factor > 1:
-            try:
+            wrong = f"{names[0]} is not a time: {values[0]!r}"
+            with translate_errors(ArithmeticError, to=lambda _, wrong=wrong: ValueError(wrong)):
                 fields[field] = int((Decimal(values[0]) * factor).quantize(1))
-            except ArithmeticError as error:
-                raise ValueError(f"{names[0]} is not a time: {values[0]!r}") from error
         else:
             fields[field] = values[0]
     sizes = [len(columns[field]) for field in ("action", "state")]

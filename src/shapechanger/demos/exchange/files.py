@@ -13,12 +13,12 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from itertools import chain, islice, repeat
+from itertools import chain, repeat
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 import numpy as np
@@ -42,7 +42,6 @@ MAX_UNPACKED: Final = 64 << 20
 MAX_VALUES: Final = 1 << 17
 """Largest number of values of a feature."""
 
-_MOST_STEPS: Final = 1 << 20
 _JPEG: Final = b"\xff\xd8"
 _PNG: Final = b"\x89PNG"
 _PNG_DEPTH: Final = slice(24, 25)  # Position of the number of bits of a value.
@@ -209,20 +208,23 @@ class _Own(msgspec.Struct):
     episodes: list[dict[str, Any]]
 
 
+_Runs = list[tuple[Driver, Annotated[int, msgspec.Meta(ge=0, lt=1 << 31)]]]
+
+
 def own_episodes(
     section: Any, where: object, count: int, found: EpisodeHeader | None = None
-) -> list[tuple[EpisodeHeader, str, list[Driver]]]:
+) -> list[tuple[EpisodeHeader, str, Iterator[Driver]]]:
     """Return the header, the outcome and the drivers of each episode that Shapechanger exported.
 
     The section must fit the number of episodes, and the sizes that the rest of the dataset has.
     """
     own: _Own = converted(section, _Own, where)
-    episodes: list[tuple[EpisodeHeader, str, list[Driver]]] = []
+    episodes: list[tuple[EpisodeHeader, str, Iterator[Driver]]] = []
     for fields in own.episodes:
         with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
             header = EpisodeHeader.from_json(fields)
-        runs = converted(fields.get("drivers", []), list[tuple[Driver, int]], where)
-        drivers = list(islice(chain.from_iterable(repeat(*run) for run in runs), _MOST_STEPS))
+        runs: _Runs = converted(fields.get("drivers", []), _Runs, where)
+        drivers = chain.from_iterable(repeat(driver, count) for driver, count in runs)
         episodes.append((header, str(fields.get("outcome", "")), drivers))
     kinds = {(h.actions.size, h.states.size, h.image_size) for h, *_ in episodes}
     if found is not None:

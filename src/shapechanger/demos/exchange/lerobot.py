@@ -159,7 +159,7 @@ class _Dataset:
         count, is_ours = max(self._entries) + 1, path.is_file()
         own = files.own_episodes(files.read_json(path), path, count, header) if is_ours else []
         for number, entry in self._entries.items():
-            head, outcome, drivers = own[number] if own else (header, "", [])
+            head, outcome, drivers = own[number] if own else (header, "", iter(()))
             task = {"task": ", ".join(entry.tasks)} if entry.tasks else {}
             clock = "real" if head.clock == "none" else head.clock  # Times come from the dataset.
             head = replace(head, clock=clock, notes=header.notes | task | head.notes)
@@ -288,7 +288,7 @@ class _Dataset:
             raise DemosError(f"{name} lacks an image at the time of a step.")
         return read_pictures(self._folder / name, times, times.ticks[nearest])
 
-    def _records(self, entry: _Entry, drivers: Sequence[Driver]) -> Iterator[base.Record]:
+    def _records(self, entry: _Entry, drivers: Iterator[Driver]) -> Iterator[base.Record]:
         """Yield the records of an episode; refuse rows with other keys than expected."""
         number, rate_hz = entry.episode_index, self._info.fps
         sizes = {f.key: f.size for f in (self._action, *self._states)}
@@ -317,6 +317,7 @@ class _Dataset:
             images = batch.column(self._stored)[here] if stored else None
             for row in range(rows):
                 frame, image = next(steps)
+                driver: Driver = next(drivers, "person")
                 single = {key: float(columns[key][row, 0]) for key in self._columns}
                 reward, is_done = single.get(_REWARD, math.nan), bool(single.get(DONE, False))
                 ended = bool(single.get(_TERMINATED, is_done))
@@ -330,7 +331,7 @@ class _Dataset:
                     name=f"step {frame} of episode {number}",
                     step=Step(
                         action=tuple(columns[_ACTION][row].tolist()),
-                        driver=drivers[frame] if frame < len(drivers) else "person",
+                        driver=driver,
                         state=tuple(v for f in self._states for v in columns[f.key][row].tolist()),
                         captured_ns=round(frame / rate_hz * 1e9),
                         reward=None if math.isnan(reward) else reward,
