@@ -165,7 +165,7 @@ def _judged(network: Network, seed: int) -> Scores:
         policy = learner.train(
             ANT.having({"bodies": msgspec.to_builtins(draw)}), STEPS, seed, on_evaluation=ignore
         )
-        save_policy(policy.described(command=COMMAND), file)
+        save_policy(policy.carded(command=COMMAND), file)
     scores = _scores(network, seed, file)
     write_json(result, scores)
     return scores

@@ -396,9 +396,7 @@ def many() -> Iterator[Row]:
     steps = int(min(GENERALIST, max(update, left / seconds * update)))
     env = ANT.having({"bodies": GENERALIST_BODIES})
     policy, seconds, speeds = _trained("rsl-limbs", GENERALIST_SETTINGS, env, steps)
-    save_policy(
-        policy.described(command="python -m benchmarks.run gpu-generalist"), GENERALIST_FILE
-    )
+    save_policy(policy.carded(command="python -m benchmarks.run gpu-generalist"), GENERALIST_FILE)
     yield Row(
         f"one policy in {count} ants on a GPU: steps",
         f"{policy.card.steps:,}",

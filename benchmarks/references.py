@@ -127,7 +127,7 @@ def _trained(name: str, seed: int) -> tuple[Evaluation, ...]:
     policy = Sb3Learner(learner, settings).train(
         env, TARGETS[name].steps, seed, on_evaluation=curve.append
     )
-    save_policy(policy.described(command=COMMAND), place.with_suffix(".safetensors"))
+    save_policy(policy.carded(command=COMMAND), place.with_suffix(".safetensors"))
     write_json(place, tuple(curve))
     return tuple(curve)
 

@@ -11,6 +11,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final, Literal
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +21,7 @@ from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
 from benchmarks.waypoints import taught_source
-from shapechanger.demos.cloning.clone import OnnxClone
+from shapechanger.demos.cloning.clone import Clone
 from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.layout import Layout
 from shapechanger.policy import load_policy
@@ -117,7 +118,8 @@ def on_board(vehicle: str = "car") -> list[Row]:
     for kind, (env, policy) in envs.items():
         with tempfile.TemporaryDirectory() as place, closing(env):
             file = Path(place, "policy.onnx")
-            policy.export(file, control_hz=1e3 / _PERIOD_MS)
+            net = msgspec.structs.replace(policy.net, control_hz=1e3 / _PERIOD_MS)
+            policy.carded(clone=net).export(file)
             if policy is clone:
                 rows.append(_inference_row(vehicle, load_policy(file)))
             here = DriveScore.of([drive(env, policy.predict, course=c) for c in courses])
@@ -143,7 +145,7 @@ def on_board(vehicle: str = "car") -> list[Row]:
     ]
 
 
-def _inference_row(vehicle: str, policy: OnnxClone) -> Row:
+def _inference_row(vehicle: str, policy: Clone) -> Row:
     pictures = np.random.default_rng(0).integers(0, 256, (20, 120, 160, 3), dtype=np.uint8)
     times: list[float] = []
     for i in range(_PICTURES):

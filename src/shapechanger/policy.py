@@ -12,6 +12,7 @@ import hashlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -22,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import MissingExtra, PolicyError, no_policy_file
-from shapechanger.files import make_folder, write_atomic
+from shapechanger.errors import MissingExtra, PolicyError, no_policy_file, translate_errors
+from shapechanger.files import make_folder, read_file, write_atomic
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 from shapechanger.registry import POLICIES
@@ -167,22 +168,23 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def trained_in(self) -> EnvRef:
-        """The env that it was trained in.
-
-        Raises:
-            PolicyError: If it learned from recordings.
-        """
+        """The env that it was trained in; raises PolicyError if it learned from recordings."""
         if self.env is None:
             raise PolicyError("This policy learned from recordings without an env.")
         return self.env
 
     @property
+    def network(self) -> CloneNetwork:
+        """The architecture of a clone; raises PolicyError for another policy."""
+        if self.clone is None:
+            raise PolicyError(f"A clone is needed here, and this policy learned by {self.learner}.")
+        return self.clone
+
+    @property
     def layouts(self) -> tuple[Layout, Layout]:
-        """Layouts of the observations and actions of a policy that is no clone."""
+        """Layouts of observations and actions; raises PolicyError for a clone without both."""
         if self.observation is None or self.action is None:
-            raise PolicyError(
-                f"A policy of numbers is needed, and this is a clone ({self.learner})."
-            )
+            raise PolicyError(f"A policy of numbers is needed, and this is a {self.learner} clone.")
         return self.observation, self.action
 
     @property
@@ -213,23 +215,22 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
         Raises:
             PolicyError: If the layouts differ.
         """
-        mine = STEERING if self.action is None else _words(self.action)
-        theirs = actions.names if self.action is None else _words(actions)
+        mine, theirs = map(_text, (self.action, actions))
+        if self.action is None:
+            mine, theirs = ", ".join(STEERING), ", ".join(actions.names)
         if mine != theirs:
             raise PolicyError(
-                f"The actions of the policy are {', '.join(mine)}, but those required here are "
-                f"{', '.join(theirs)}."
+                f"The actions of the policy are {mine}, but those required here are {theirs}."
             )
-        felt = () if state is None else _words(state)
-        if self.observation is not None and _words(self.observation) != felt:
+        if self.observation is not None and _text(self.observation) != _text(state):
             raise PolicyError(
-                f"The policy needs the state {', '.join(_words(self.observation))}, but it gets "
-                f"{', '.join(felt) or 'none'}."
+                f"The policy needs the state {_text(self.observation)}, but it gets {_text(state)}."
             )
 
 
-def _words(layout: Layout) -> tuple[str, ...]:
-    return tuple(f"{f}{f' x {f.shape}' if f.shape else ''}" for f in layout)
+def _text(layout: Layout | None) -> str:
+    words = (f"{f}{f' x {f.shape}' if f.shape else ''}" for f in layout or ())
+    return ", ".join(words) or "none"
 
 
 class Policy(ABC):
@@ -253,23 +254,6 @@ class Policy(ABC):
     def tensors(self) -> dict[str, NDArray[Any]]:
         """Return the arrays of its file, keyed by name."""
         raise PolicyError("A policy from an ONNX file cannot be written again: copy the file.")
-
-    def described(
-        self, *, command: str = "", identity: Mapping[str, Identity] | None = None, **data: Any
-    ) -> Self:
-        """Return the same policy with more information on its card.
-
-        Args:
-            command: The command that made it; "" keeps the present one.
-            identity: Version of its ingredients (env, learner, packages); None keeps the present
-                one.
-            **data: Origin of its demonstrations; values that JSON can hold.
-        """
-        return self.carded(
-            command=command or self.card.command,
-            identity=self.card.identity if identity is None else dict(identity),
-            data={**self.card.data, **data},
-        )
 
     def carded(self, **changes: Any) -> Self:
         """Return the same policy with other values of its card."""
@@ -338,10 +322,9 @@ def load_policy(path: str | PathLike[str], algorithm: str = "") -> Any:
     except (PolicyError, MissingExtra):
         raise
     except Exception as cause:  # The errors of libraries have no common base.
-        line = (str(cause).strip().splitlines() or [""])[0]
-        text = line[:_LONGEST].rstrip(".: ") or "it needs more memory than there is"
-        if isinstance(cause, KeyError):
-            text = f"it lacks {text}"
+        reason = str(getattr(cause, "strerror", cause)).strip()
+        text = reason.partition("\n")[0][:_LONGEST].rstrip(".: ") or "it needs too much memory"
+        text = f"it lacks {text}" if isinstance(cause, KeyError) else text
         raise PolicyError(
             f"{file} is not a policy that Shapechanger has written ({text})."
         ) from cause
@@ -358,14 +341,13 @@ def save_policy(policy: Policy, path: str | PathLike[str]) -> None:
 
 def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes) -> bytes:
     """Return the content of a file, with its card in JSON; equal ones give equal bytes."""
-    safetensors = _safetensors()
     # Safetensors keeps the bytes of an array as they lie in memory.
     arrays = {name: np.asarray(value, order="C") for name, value in tensors.items()}
-    content = safetensors.save(arrays, metadata={_CARD: card.decode()})
+    content = _safetensors().save(arrays, metadata={_CARD: card.decode()})
     # Safetensors writes the metadata in any order: write the header again with sorted metadata.
     end = _LENGTH_BYTES + int.from_bytes(content[:_LENGTH_BYTES], "little")
     header = json.loads(content[_LENGTH_BYTES:end])
-    header["__metadata__"] |= {_HASH: _digest(card, arrays)}
+    header["__metadata__"][_HASH] = _digest(card, arrays)
     text = json.dumps(header, separators=(",", ":"), ensure_ascii=False).encode()
     text += b" " * (-len(text) % _LENGTH_BYTES)
     return len(text).to_bytes(_LENGTH_BYTES, "little") + text + content[end:]
@@ -378,7 +360,7 @@ def read_tensors(path: Path) -> tuple[PolicyCard, dict[str, NDArray[Any]]]:
         OSError, LookupError, ValueError, msgspec.MsgspecError: If it cannot be read, or has been
             changed.
     """
-    content = _read_limited(path)
+    content = read_file(path, MAX_BYTES)
     length = int.from_bytes(content[:_LENGTH_BYTES], "little")
     try:
         if length > _MAX_HEADER_BYTES:
@@ -387,8 +369,6 @@ def read_tensors(path: Path) -> tuple[PolicyCard, dict[str, NDArray[Any]]]:
         metadata = msgspec.convert(header["__metadata__"], dict[str, str])
     except (ValueError, LookupError, TypeError, RecursionError, msgspec.MsgspecError) as error:
         raise ValueError("it is not a safetensors file with a card") from error
-    if "kind" in metadata:
-        raise ValueError("an older version wrote this clone: train it again")
     tensors = _safetensors().load(content)
     card = metadata[_CARD].encode()
     if _digest(card, tensors) != metadata[_HASH]:
@@ -397,20 +377,8 @@ def read_tensors(path: Path) -> tuple[PolicyCard, dict[str, NDArray[Any]]]:
 
 
 def _safetensors() -> Any:
-    try:
-        from safetensors import numpy
-    except ImportError as error:
-        raise MissingExtra("safetensors", "learn") from error
-    return numpy
-
-
-def _read_limited(path: Path) -> bytes:
-    """Return the content of a file; pipes and devices, which may never end, are refused."""
-    if path.exists() and not path.is_file():
-        raise ValueError("it is not a file")
-    if path.stat().st_size > MAX_BYTES:
-        raise ValueError(f"it is larger than {MAX_BYTES >> 20} MiB")
-    return path.read_bytes()
+    with translate_errors(ImportError, to=lambda _: MissingExtra("safetensors", "learn")):
+        return import_module("safetensors.numpy")
 
 
 def _digest(card: bytes, tensors: Mapping[str, NDArray[Any]]) -> str:
@@ -433,12 +401,9 @@ def read_network(path: Path) -> tuple[PolicyCard, Network]:
     Raises:
         Exception: If the file cannot be used; the errors of onnxruntime have no common base.
     """
-    content = _read_limited(path)
-    try:
-        import onnxruntime  # pyright: ignore[reportMissingTypeStubs]
-    except ImportError as missing:
-        raise MissingExtra("onnxruntime", "onboard") from missing
-    runtime: Any = onnxruntime
+    content = read_file(path, MAX_BYTES)
+    with translate_errors(ImportError, to=lambda _: MissingExtra("onnxruntime", "onboard")):
+        runtime: Any = import_module("onnxruntime")
     options = runtime.SessionOptions()
     # One policy is small: more threads would only wait for one another.
     options.intra_op_num_threads = 1

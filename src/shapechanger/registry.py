@@ -126,7 +126,7 @@ POLICIES: Final[Registry[Any]] = Registry(
         "trained": "transfer.learners.policy_file:TrainedPolicy.of_file",
         "trained-onnx": "policy:OnnxPolicy",
         "clone": "demos.cloning.network:CameraPolicy.of_file",
-        "clone-onnx": "demos.cloning.clone:OnnxClone",
+        "clone-onnx": "demos.cloning.clone:Clone",
     },
 )
 """Functions that read a file, by the kind of policy that its header names."""

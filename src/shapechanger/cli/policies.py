@@ -198,7 +198,8 @@ class PoliciesExport(_InEnv):
             raise StudyError(f"{self.file} has been exported already.")
         if policy.card.clone is not None:
             body, control_hz = _learned_with(policy.card, policy.card.clone)
-            policy.export(self.out, body=body, control_hz=control_hz)
+            net = msgspec.structs.replace(policy.net, body=body, control_hz=control_hz)
+            policy.carded(clone=net).export(self.out)
         else:
             from shapechanger.transfer.export import export_limbs, export_onnx  # PyTorch.
 

@@ -118,7 +118,7 @@ class Train:
                 on_steps=on_steps,
                 **more,
             )
-            policy.described(command=command_line()).save(out)
+            policy.carded(command=command_line()).save(out)
 
         return whole, training
 
@@ -136,7 +136,7 @@ class Train:
 
         def training(on_steps: Callable[[int], None]) -> None:
             policy = train_student(env, load_policy(teacher), steps, self.seed, on_steps=on_steps)
-            policy.described(command=command_line()).save(out)
+            policy.carded(command=command_line()).save(out)
 
         return steps, training
 

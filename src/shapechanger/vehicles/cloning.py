@@ -307,7 +307,8 @@ class CloneLearner(Learner[CloningSettings]):
 def stated(policy: CameraPolicy, env: EnvRef, steps: int, seed: int, **data: Any) -> CameraPolicy:
     """State in a clone's card the env, and the steps and seed of all of its training."""
     identity = known({ENV: identify(env)})
-    return policy.carded(env=env, steps=steps, seed=seed).described(identity=identity, **data)
+    data = {**policy.card.data, **data}
+    return policy.carded(env=env, steps=steps, seed=seed, identity=dict(identity), data=data)
 
 
 STUDENT_STEPS: Final = 7200

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.clone import class_numbers, clone_of, targets
+from shapechanger.demos.cloning.clone import class_numbers, targets
 from shapechanger.demos.cloning.evaluation import (
     AskedHead,
     evaluate,
@@ -174,7 +174,7 @@ def _card(
     actions: np.ndarray, layout: Layout, asked: AskedHead, mirrored: np.ndarray | None = None
 ) -> CloneNetwork:
     fields = output_fields(actions, layout, asked, mirrored)
-    return clone_of(clone_card(layout, **fields))
+    return clone_card(layout, **fields).network
 
 
 def test_keys_become_classes_with_names() -> None:

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from onnx import TensorProto, helper
 
-from shapechanger.demos.cloning.clone import OnnxClone
+from shapechanger.demos.cloning.clone import Clone
 from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.errors import DemosError, PolicyError
 from shapechanger.layout import Feature, Layout
@@ -50,7 +50,7 @@ def path(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("kind", _CARDS)
 def test_files_have_the_same_card_and_actions(kind: str, tmp_path: Path) -> None:
     card = _CARDS[kind]
-    policy = CameraPolicy.blank(card, seed=1).described(command="clone it", minutes=[1, 2])
+    policy = CameraPolicy.blank(card, seed=1).carded(command="clone it")
     saved, exported = tmp_path / "policy.safetensors", tmp_path / "policy.onnx"
     policy.save(saved)
     again = load_policy(saved)
@@ -58,11 +58,10 @@ def test_files_have_the_same_card_and_actions(kind: str, tmp_path: Path) -> None
     again.save(tmp_path / "again.safetensors")
     assert (tmp_path / "again.safetensors").read_bytes() == saved.read_bytes()
 
-    policy.export(exported, body="car", control_hz=20.0)
+    policy.export(exported)
     onnx = load_policy(exported)
-    assert isinstance(onnx, OnnxClone)
-    net = msgspec.structs.replace(policy.net, body="car", control_hz=20.0)
-    assert onnx.card == msgspec.structs.replace(policy.card, clone=net)
+    assert type(onnx) is Clone
+    assert onnx.card == policy.card
     with pytest.raises(PolicyError, match="cannot be written again"):
         onnx.save(saved)
 

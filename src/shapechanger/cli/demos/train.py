@@ -132,15 +132,15 @@ class DemosTrain(_Waypoints):
         say(training.mirror_note)
         body = "" if view is not None else data.body
         net = replace(policy.net, body=body, control_hz=data.control_hz)
-        policy = policy.carded(clone=net).described(
-            command=command_line(),
-            data=str(self.data),
-            digest=shrinking.digest(data.actions),
-            learned_s=n / len(data) * data.duration_s,
-            steps=len(data),
-            rate_jitter=round(data.rate_jitter, 4),
+        origin = {
+            "data": str(self.data),
+            "digest": shrinking.digest(data.actions),
+            "learned_s": n / len(data) * data.duration_s,
+            "steps": len(data),
+            "rate_jitter": round(data.rate_jitter, 4),
             **origin,
-        )
+        }
+        policy = policy.carded(clone=net, command=command_line(), data=origin)
         note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
         if not evaluated.any():
             evaluated = learned

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
@@ -19,15 +19,12 @@ from shapechanger.policy import CloneNetwork, Framing, Network, Policy, PolicyCa
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import EpisodeHeader
 
-_CHUNK: Final = 256  # Images at a time, to bound the memory of the sums.
 # A mean in single precision may miss a half by a rounding error, and is still rounded up.
 HALF: Final = 0.5 + 1e-4
 _ROUNDING: Final = 1e-4  # Tolerance of actions in single precision.
 
 
-def _require(
-    settings: msgspec.Struct, names: str, limits: str, fits: Callable[[float], bool]
-) -> None:
+def _require(settings: Any, names: str, limits: str, fits: Callable[[float], bool]) -> None:
     """Refuse the settings in `names` that have a value out of limits, or an empty tuple."""
     for name in names.split():
         value: Any = getattr(settings, name)
@@ -125,9 +122,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         counts = "channels features batch fewest_steps checks patience nerves members"
         shares = "held_out rehearsal dropout smoothing averaging"
         _require(self, counts, "at least 1", lambda x: x >= 1)
-        _require(
-            self, "most_steps", "at least fewest_steps", lambda steps: steps >= self.fewest_steps
-        )
+        _require(self, "most_steps", "at least fewest_steps", lambda x: x >= self.fewest_steps)
         _require(self, "passes learning_rate further_rate", "positive", lambda x: x > 0.0)
         _require(self, "warm_up weight_decay", "at least 0", lambda x: x >= 0.0)
         _require(self, shares, "in [0, 1)", lambda x: 0.0 <= x < 1.0)
@@ -178,14 +173,11 @@ def settings_for(steps: int) -> CloneSettings:
 
 
 def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
-    """Crop and reduce images.
-
-    Each pixel is the mean of the area that it covers, rounded half up: of a block of pixels where
-    the size divides evenly, and weighted by the covered shares elsewhere. Images that already
-    have the target size are returned unchanged.
+    """Crop and reduce images: each pixel is the mean of its area, rounded half up.
 
     Args:
-        pictures: Red, green and blue, shape (n, H, W, 3).
+        pictures: Red, green and blue, shape (n, H, W, 3); returned unchanged if they already have
+            the target size.
         framing: Crop and resolution.
 
     Returns:
@@ -194,46 +186,32 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
     Raises:
         DemosError: If the images have another type or shape.
     """
-    if pictures.ndim != 4 or pictures.shape[3] != 3 or pictures.dtype != np.uint8:
+    shape = pictures.shape
+    if len(shape) != 4 or shape[3] != 3 or 0 in shape[1:] or pictures.dtype != np.uint8:
         raise DemosError(
             "Images must be uint8 with shape (n, height, width, 3), got "
-            f"{pictures.dtype} with shape {pictures.shape}."
+            f"{pictures.dtype} with shape {shape}."
         )
-    if pictures.shape[1:] == framing.shape:
+    if shape[1:] == framing.shape:
         return pictures
-    if not pictures.shape[1] or not pictures.shape[2]:
-        raise DemosError(f"Images of shape {pictures.shape} have no pixels.")
-    # At least one row is left.
-    first = min(round(pictures.shape[1] * framing.top), pictures.shape[1] - 1)
-    rows, rest_of_rows = divmod(pictures.shape[1] - first, framing.height)
-    columns, rest_of_columns = divmod(pictures.shape[2], framing.width)
-    if rest_of_rows or rest_of_columns or not rows or not columns:
-        return _by_area(pictures[:, first:], framing)
+    _, height, width, _ = shape
+    first = first_row(height, framing)
+    rows = area_shares(height - first, framing.height)
+    columns = area_shares(width, framing.width)
     small = np.empty((len(pictures), *framing.shape), np.uint8)
-    for start in range(0, len(pictures), _CHUNK):
-        part = pictures[start : start + _CHUNK, first:]
-        # Adding strided views is several times faster than a mean over reshaped axes.
-        total = np.full((len(part), *framing.shape), rows * columns // 2, np.uint32)
-        for row in range(rows):
-            for column in range(columns):
-                total += part[:, row::rows, column::columns]
-        small[start : start + _CHUNK] = total // (rows * columns)
+    for i, picture in enumerate(pictures[:, first:]):  # One at a time: they may be large.
+        low = (rows @ picture.reshape(len(picture), -1).astype(np.float32)).reshape(-1, width, 3)
+        narrow = columns @ low.swapaxes(0, 1).reshape(width, -1)
+        small[i] = np.floor(narrow.reshape(-1, len(low), 3).swapaxes(0, 1) + HALF)
     return small
 
 
-def _by_area(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
-    """Reduce images whose size does not divide evenly: rows first, then columns."""
-    n, height, width, _ = pictures.shape
-    of_rows = area_shares(height, framing.height)
-    of_columns = area_shares(width, framing.width)
-    small = np.empty((n, *framing.shape), np.uint8)
-    for i, picture in enumerate(pictures):  # One at a time: they may be large.
-        low = of_rows @ picture.reshape(height, -1).astype(np.float32)
-        narrow = of_columns @ low.reshape(framing.height, width, 3)
-        small[i] = np.floor(narrow + HALF)
-    return small
+def first_row(height: int, framing: Framing) -> int:
+    """Return the first row that is not cut off; at least one is left."""
+    return min(round(height * framing.top), height - 1)
 
 
+@cache
 def area_shares(before: int, after: int) -> NDArray[np.float32]:
     """Return the weight of each old pixel in each new one along one axis, shape (after, before)."""
     edges = np.linspace(0.0, before, after + 1)
@@ -273,29 +251,22 @@ class ShrunkFrames:
         return hashlib.sha256(b"".join(self.seen) + actions.tobytes()).hexdigest()
 
 
-def clone_of(card: PolicyCard) -> CloneNetwork:
-    """Return the architecture of a clone.
-
-    Raises:
-        PolicyError: If the policy is not a clone.
-    """
-    if card.clone is None:
-        raise PolicyError(
-            f"A clone of demonstrations is needed here, and this policy was trained with "
-            f"{card.learner}."
-        )
-    return card.clone
-
-
 class Clone(Policy):
-    """A cloned policy, for images, states or both."""
+    """A cloned policy, for images, states or both.
+
+    Args:
+        card: Its card.
+        run: Its network, which maps prepared images, `picture`, and states, `state`, to outputs.
+    """
+
+    def __init__(self, card: PolicyCard, run: Network) -> None:
+        self.card, self._run = card, run
 
     @property
     def net(self) -> CloneNetwork:
         """Its architecture."""
-        return clone_of(self.card)
+        return self.card.network
 
-    @abstractmethod
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
@@ -303,15 +274,15 @@ class Clone(Policy):
 
         The arguments are the same as for `predict_many`.
         """
+        given = zip(("picture", "state"), prepared(self.card, pictures, states), strict=True)
+        return self._run({name: part for name, part in given if part is not None})
 
     def predict(
         self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
         """Return the action, shape (m,), for one image, (H, W, 3), and state, (k,)."""
-        return self.predict_many(
-            None if picture is None else picture[np.newaxis],
-            None if state is None else state[np.newaxis],
-        )[0]
+        single: Any = (None if part is None else part[np.newaxis] for part in (picture, state))
+        return self.predict_many(*single)[0]
 
     def predict_many(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
@@ -346,20 +317,6 @@ class Clone(Policy):
         return self.predict_many(*((None, values) if self.net.eyes == "none" else (values,)))
 
 
-class OnnxClone(Clone):
-    """A cloned policy from an ONNX file, which runs without PyTorch."""
-
-    def __init__(self, card: PolicyCard, run: Network) -> None:
-        self.card, self._run = card, run
-
-    def outputs(
-        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
-    ) -> NDArray[np.float32]:
-        """Return the outputs of the network, as `Clone` describes them."""
-        given = zip(("picture", "state"), prepared(self.card, pictures, states), strict=True)
-        return self._run({name: part for name, part in given if part is not None})
-
-
 def load_clone(path: Path) -> Clone:
     """Load a clone from a PyTorch or ONNX file.
 
@@ -369,10 +326,7 @@ def load_clone(path: Path) -> Clone:
     """
     policy = load_policy(path)
     if not isinstance(policy, Clone):
-        raise PolicyError(
-            f"{path} was trained with {policy.card.learner}, and a clone of demonstrations is "
-            "needed here."
-        )
+        raise PolicyError(f"{path} learned by {policy.card.learner}, and a clone is needed here.")
     return policy
 
 
@@ -391,7 +345,7 @@ def prepared(
     Raises:
         DemosError: If an input is missing or has another shape.
     """
-    net, layout = clone_of(card), card.observation
+    net, layout = card.network, card.observation
     seen = None
     if net.eyes != "none":
         if pictures is None:

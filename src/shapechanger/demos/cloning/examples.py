@@ -17,7 +17,6 @@ from torch.nn import functional
 from shapechanger.demos.cloning.clone import (
     Augmentation,
     CloneSettings,
-    clone_of,
     prepared,
     targets,
 )
@@ -256,7 +255,7 @@ def examples_of(
     Raises:
         DemosError: If the demonstrations lack an input, or an action is out of range.
     """
-    net = clone_of(card)
+    net = card.network
     pictures, states = prepared(card, data.pictures, data.states)
     if pictures is not None:  # PyTorch does not accept read-only arrays.
         pictures = np.require(pictures, requirements=["C", "W"])

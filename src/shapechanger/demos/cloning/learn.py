@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.clone import CloneSettings, clone_of, settings_for
+from shapechanger.demos.cloning.clone import CloneSettings, settings_for
 from shapechanger.demos.cloning.evaluation import AskedHead, output_fields
 from shapechanger.errors import DemosError, MissingExtra, check_seed
 from shapechanger.policy import CloneNetwork, PolicyCard
@@ -204,7 +204,7 @@ def learn(
             steps.append(_fit(policy, shown, again, settings, kept_back, own_seed, report))
         networks.append(policy.network)
         validated.append(_validation(policy, shown.part(kept_back)))
-    net = clone_of(card)
+    net = card.network
     net = msgspec.structs.replace(
         net, members=net.members if members == 1 else members, seeds=(*net.seeds, seed)
     )

@@ -1,7 +1,6 @@
 """Cloned policies of PyTorch: encoders for images and states, and a linear output layer.
 
-The names of the attributes (`eyes`, `nerves`, `hands`, ...) name the weights in the file of
-a policy, and must not change.
+The attributes `eyes`, `nerves` and `hands` name the weights in the file of a policy.
 """
 
 from __future__ import annotations
@@ -9,7 +8,8 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.clone import Clone, CloneSettings, clone_of, prepared
+from shapechanger.demos.cloning.clone import Clone, CloneSettings, prepared
 from shapechanger.errors import MissingExtra
 from shapechanger.layout import Layout
 from shapechanger.onnx_file import export_network
@@ -119,10 +119,8 @@ class Nerves(nn.Module):
         self.register_buffer("middle", torch.zeros(size))
         self.register_buffer("spread", torch.ones(size))
         layers: list[nn.Module] = []
-        before = 2 * size
-        for after in widths:
+        for before, after in pairwise((2 * size, *widths)):
             layers += [nn.Linear(before, after), nn.ReLU()]
-            before = after
         self.layers = nn.Sequential(*layers)
 
     def forward(self, states: Tensor) -> Tensor:
@@ -140,19 +138,23 @@ class _Several(nn.ModuleList):
         return torch.cat([one(x) for one in self], dim=1)
 
 
+def _one_or_several(parts: Sequence[nn.Module]) -> nn.Module | None:
+    return _Several(parts) if len(parts) > 1 else next(iter(parts), None)
+
+
 class CameraNetwork(nn.Module):
     """Network of a clone: encoders and output layer, as the card describes them."""
 
     def __init__(self, card: PolicyCard) -> None:
         super().__init__()
-        net = clone_of(card)
-        sees, feels = net.eyes != "none", card.observation
-        eyes = [Eyes(net) for _ in range(net.members if sees else 0)]
+        net, feels = card.network, card.observation
+        self.seen = 0 if net.eyes == "none" else net.members * net.features
+        self.felt = 0 if feels is None else net.members * net.nerves[-1]
+        eyes = [Eyes(net) for _ in range(net.members) if self.seen]
         nerves = [Nerves(feels.size, net.nerves) for _ in range(net.members) if feels is not None]
-        self.eyes: nn.Module | None = _one_or_several(eyes)
-        self.nerves: nn.Module | None = _one_or_several(nerves)
-        features = len(eyes) * net.features + (len(nerves) * net.nerves[-1] if nerves else 0)
-        self.hands = nn.Linear(features, len(net.classes) or card.action_size)
+        self.eyes, self.nerves = _one_or_several(eyes), _one_or_several(nerves)
+        self.hands = nn.Linear(self.seen + self.felt, len(net.classes) or card.action_size)
+        self.activation = nn.Softmax(dim=1) if net.classes else nn.Tanh()
         # With colours last in memory, convolutions of a single image are a third faster.
         self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
@@ -162,11 +164,10 @@ class CameraNetwork(nn.Module):
         found = [encoder(part) for encoder, part in given if encoder is not None]
         return found[0] if len(found) == 1 else torch.cat(found, dim=1)
 
-
-def _one_or_several(parts: Sequence[nn.Module]) -> nn.Module | None:
-    if len(parts) < 2:
-        return parts[0] if parts else None
-    return _Several(parts)
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return the outputs, as `Clone.outputs` does, for prepared images, a state, or both."""
+        seen = None if self.eyes is None else scaled(inputs[0])
+        return self.activation(self.hands(self.perceive(seen, inputs[-1])))
 
 
 class CameraPolicy(Clone):
@@ -194,12 +195,8 @@ class CameraPolicy(Clone):
         """
         if actions is not None and actions.names == STEERING:
             actions = None
-        clone = CloneNetwork(
-            framing=settings.framing,
-            channels=settings.channels,
-            features=settings.features,
-            eyes=settings.eyes,
-        )
+        same = ("framing", "channels", "features", "eyes")
+        clone = CloneNetwork(**{name: getattr(settings, name) for name in same})
         return cls.blank(PolicyCard(learner="cloning", action=actions, clone=clone), seed)
 
     @classmethod
@@ -211,6 +208,9 @@ class CameraPolicy(Clone):
     @classmethod
     def of_file(cls, card: PolicyCard, weights: Mapping[str, NDArray[Any]]) -> CameraPolicy:
         """Return the policy of a file, see `shapechanger.load_policy`."""
+        for name, value in weights.items():
+            if value.dtype != np.float32 or not np.isfinite(value).all():
+                raise ValueError(f"its weights {name} must be finite and in single precision")
         # On the meta device a forged card cannot allocate memory before the sizes are compared.
         with torch.device("meta"):
             network = CameraNetwork(card)
@@ -218,9 +218,6 @@ class CameraPolicy(Clone):
         network.load_state_dict(state, assign=True)
         # Assigned weights keep the memory layout of the file, so that sums have the same order.
         network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
-        for name, value in weights.items():
-            if value.dtype != np.float32 or not np.isfinite(value).all():
-                raise ValueError(f"its weights {name} must be finite and in single precision")
         settings = msgspec.convert(card.settings, CloneSettings | None)
         return cls(network, msgspec.structs.replace(card, settings=settings))
 
@@ -232,14 +229,13 @@ class CameraPolicy(Clone):
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
         """Return the outputs of the network, as `Clone` describes them."""
-        return _activated(self.logits(pictures, states), self.net).numpy()
+        return self.network.activation(self.logits(pictures, states)).numpy()
 
     def logits(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> Tensor:
         """Return the outputs of the last layer, from which `outputs` are computed."""
-        small, states = prepared(self.card, pictures, states)
-        known = None if states is None else torch.as_tensor(states)
+        small, known = prepared(self.card, pictures, states)
         n = len(small) if small is not None else len(known) if known is not None else 0
         found = torch.empty(n, self.network.hands.in_features)
         with torch.inference_mode():
@@ -247,7 +243,7 @@ class CameraPolicy(Clone):
                 some = slice(start, start + _CHUNK)
                 found[some] = self.network.perceive(
                     None if small is None else scaled(torch.as_tensor(small[some].copy())),
-                    None if known is None else known[some],
+                    None if known is None else torch.as_tensor(known[some]),
                 )
             return self.network.hands(found)
 
@@ -255,50 +251,21 @@ class CameraPolicy(Clone):
         """Return a policy that shares no weights with this one."""
         return CameraPolicy(copy.deepcopy(self.network), self.card)
 
-    def export(self, path: Path, *, body: str = "", control_hz: float | None = None) -> None:
+    def export(self, path: Path) -> None:
         """Write the policy as ONNX, which a robot runs without PyTorch.
 
         Its inputs are `picture`, uint8 of the shape (n, height, width, 3) that the card's framing
         gives, and `state`, float32 of shape (n, values); its output is `output`, float32: actions
         in [-1, 1], or probabilities of the card's classes.
 
-        Args:
-            path: The file, such as `car.onnx`.
-            body: Kind of robot that it learned in; "" for any.
-            control_hz: Actions per second that it learned with; None if unknown.
-
         Raises:
             MissingExtra: If onnx or onnxscript is not installed.
             OutputError: If the file cannot be written.
         """
-        net = msgspec.structs.replace(self.net, body=body, control_hz=control_hz)
-        card = msgspec.structs.replace(self.card, clone=net)
         kinds = {"picture": torch.uint8, "state": torch.float32}
-        inputs = {
-            name: torch.zeros((2, *shape), dtype=kinds[name])
-            for name, shape in card.shapes.items()
-            if name in kinds
-        }
-        export_network(_Whole(self.network, net, tuple(inputs)), inputs, card, path)
-
-
-class _Whole(nn.Module):
-    """A network with the scaling of images and outputs."""
-
-    def __init__(self, network: CameraNetwork, net: CloneNetwork, inputs: tuple[str, ...]) -> None:
-        super().__init__()
-        self.network, self.net, self.inputs = network, net, inputs
-
-    def forward(self, *given: Tensor) -> Tensor:
-        named = dict(zip(self.inputs, given, strict=True))
-        seen = scaled(named["picture"]) if "picture" in named else None
-        out = self.network.hands(self.network.perceive(seen, named.get("state")))
-        return _activated(out, self.net)
-
-
-def _activated(out: Tensor, net: CloneNetwork) -> Tensor:
-    """Return probabilities of classes, or actions in [-1, 1], for outputs of the last layer."""
-    return torch.softmax(out, dim=1) if net.classes else torch.tanh(out)
+        shapes = self.card.shapes
+        inputs = {n: torch.zeros((2, *shapes[n]), dtype=kinds[n]) for n in kinds if n in shapes}
+        export_network(self.network, inputs, self.card, path)
 
 
 def scaled(pictures: Tensor) -> Tensor:
@@ -309,24 +276,18 @@ def scaled(pictures: Tensor) -> Tensor:
 @contextmanager
 def seeded(seed: int) -> Generator[None]:
     """Seed the global generator, and restore it at the end."""
-    fork = cast(
-        "AbstractContextManager[None]",
-        torch.random.fork_rng(devices=[]),  # pyright: ignore[reportUnknownMemberType]
-    )
-    with fork:
+    with cast("Any", torch.random).fork_rng(devices=[]):
         torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
         yield
 
 
-def joined(card: PolicyCard, members: list[CameraNetwork]) -> CameraNetwork:
+def joined(card: PolicyCard, members: Sequence[CameraNetwork]) -> CameraNetwork:
     """Return one network, as a card describes it, whose output is the mean of its members."""
     network = CameraNetwork(card)
     for name in ("eyes", "nerves"):
-        several = getattr(network, name)
-        if several is not None:
-            for one, member in zip(several, members, strict=True):
-                one.load_state_dict(getattr(member, name).state_dict())
-    seen = clone_of(card).features if network.eyes is not None else 0
+        for one, member in zip(getattr(network, name) or (), members, strict=False):
+            one.load_state_dict(getattr(member, name).state_dict())
+    seen = members[0].seen
     weights = [member.hands.weight for member in members]
     parts = [weight[:, :seen] for weight in weights] + [weight[:, seen:] for weight in weights]
     with torch.no_grad():

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from shapechanger.demos.cloning.clone import HALF, area_shares, clone_of
+from shapechanger.demos.cloning.clone import HALF, area_shares, first_row
 from shapechanger.demos.cloning.network import BRIGHTEST, CameraNetwork, CameraPolicy
 from shapechanger.errors import MissingExtra, PolicyError
 from shapechanger.policy import PolicyCard
@@ -60,7 +60,7 @@ class ClonedPerception(BaseFeaturesExtractor):
 
     def __init__(self, observation_space: Any, card: str) -> None:
         known = msgspec.json.decode(card, type=PolicyCard)
-        net, layout, network = clone_of(known), known.observation, CameraNetwork(known)
+        net, layout, network = known.network, known.observation, CameraNetwork(known)
         super().__init__(observation_space, network.hands.in_features)  # pyright: ignore[reportUnknownMemberType]
         self.eyes, self.nerves, self.network = network.eyes, network.nerves, network
         self._unseen = [layout.slices[name] for name in net.unseen if layout is not None]
@@ -68,7 +68,7 @@ class ClonedPerception(BaseFeaturesExtractor):
             space = observation_space
             image = space[_IMAGE] if isinstance(space, spaces.Dict) else space
             _, height, width = cast("tuple[int, int, int]", image.shape)  # Channels first in SB3.
-            self._first = min(round(height * net.framing.top), height - 1)
+            self._first = first_row(height, net.framing)
             rows = area_shares(height - self._first, net.framing.height)
             self.register_buffer("rows", torch.as_tensor(rows), persistent=False)
             columns = area_shares(width, net.framing.width)

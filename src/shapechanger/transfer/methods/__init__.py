@@ -138,8 +138,8 @@ class MethodRun:
         Args:
             policy: The policy.
         """
-        if self.identity and hasattr(policy, "described"):  # It has a card.
-            policy = policy.described(identity={**policy.card.identity, **self.identity})
+        if self.identity and hasattr(policy, "carded"):  # It has a card.
+            policy = policy.carded(identity={**policy.card.identity, **self.identity})
         policy.save(self.policy_file)
 
     def evaluate(self, policy: Any, body_map: BodyMap | None = None) -> Evaluation:

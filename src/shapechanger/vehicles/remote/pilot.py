@@ -18,7 +18,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from shapechanger.demos.cloning.clone import Clone, clone_of, load_clone
+from shapechanger.demos.cloning.clone import Clone, load_clone
 from shapechanger.demos.statistics import is_same_rate
 from shapechanger.errors import PolicyError, RobotRefused, ShapechangerError, no_policy_file
 from shapechanger.layout import Layout
@@ -49,7 +49,7 @@ def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
         PolicyError: If body, rate, actions or state differ.
         RobotRefused: If the robot lacks a camera, how it looks, or how the vehicle turns.
     """
-    net = clone_of(card)
+    net = card.network
     if net.body and net.body != robot.body:
         raise PolicyError(
             f"The policy learned to steer a {net.body}, and {robot.robot} is a {robot.body}: only "
