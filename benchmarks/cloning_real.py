@@ -208,7 +208,7 @@ def scores(
             predict = plain(squares[past], truth[past], seed)
             theirs[i, seed] = _scored(predict(squares[future]), truth[future], began)
             began = time.monotonic()
-            policy, _ = learn(data, learned, head="class", seed=seed)
+            policy, _ = learn(data.part(learned), head="class", seed=seed)
             done = class_numbers(policy.predict_many(pictures[future]), classes)
             ours[i, seed] = _scored(done, truth[future], began)
     # Accuracy of always predicting the most frequent key, on the test segments.
@@ -291,11 +291,10 @@ def held_out() -> list[Row]:
         for name, (share, settings, networks) in _WAYS.items():
             learned = np.zeros(len(data), np.bool_)
             learned[: past.stop - int(share * past.stop)] = True
+            past_data = data.part(learned)
             for seed in range(SEEDS):
                 policies = [
-                    learn(data, learned, settings=settings, head="class", seed=networks * seed + j)[
-                        0
-                    ]
+                    learn(past_data, settings=settings, head="class", seed=networks * seed + j)[0]
                     for j in range(networks)
                 ]
                 seen = _pictures(data)[future]
@@ -349,7 +348,7 @@ def _from_simulation(data: Dataset) -> list[Row]:
         for seed in range(SEEDS):
             start = source or CameraPolicy.fresh(FEW_FRAMES, seed)
             policy, _ = learn(
-                steered, ~later, settings=FEW_FRAMES, seed=seed, start=start, symmetric=True
+                steered.part(~later), settings=FEW_FRAMES, seed=seed, start=start, symmetric=True
             )
             steering = policy.predict_many(pictures)[:, 0]
             each.append(_auc(-steering, left & later, forward & later))

@@ -141,7 +141,7 @@ def test_a_state_is_mirrored_with_its_image() -> None:
         (_layout("hip_1/angle", "throttle"), "hip_1/angle"),
         (_layout("left", "throttle"), "left"),
         (_layout("steering", low=0.0), "steering"),
-        (Layout((Feature("speed", "1", shape=(3,)),)), "array speed"),
+        (Layout((Feature("speed", "1", shape=(3,)),)), "speed"),
     ],
 )
 def test_a_layout_without_a_mirror_is_refused(layout: Layout, name: str) -> None:

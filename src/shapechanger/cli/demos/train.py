@@ -119,8 +119,7 @@ class DemosTrain(_Waypoints):
                     progress(names[check.member], check.step, False)
 
                 policy, training = learn(
-                    data,
-                    learned,
+                    data.part(learned),
                     settings=settings,
                     head="regression" if view is not None else self.head,
                     inputs=self.inputs,

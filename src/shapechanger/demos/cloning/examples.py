@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from shapechanger.demos.cloning.clone import (
-    Augmentation,
-    CloneSettings,
-    prepared,
-    targets,
-)
+from shapechanger.demos.cloning.clone import Augmentation, CloneSettings, prepared, targets
 from shapechanger.demos.cloning.network import BRIGHTEST
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
@@ -77,14 +72,12 @@ def mirror_of(layout: Layout) -> Mirror:
     for place, feature in enumerate(layout):
         parts = set(feature.name.split("/"))
         other = _SIDE.sub(lambda found: _SIDES[found[0]], feature.name)
-        if feature.shape:
-            raise DemosError(f"the mirror image of the array {feature.name} is unknown")
-        if other != feature.name and other in names:
+        if other != feature.name and other in names and not feature.shape:
             rightward = 1.0 if _SIDE.findall(feature.name) == ["right"] else -1.0
             values.append((names.index(other), 1.0, rightward))
-        elif parts & _NEGATED and feature.low == -feature.high:
+        elif parts & _NEGATED and feature.low == -feature.high and not feature.shape:
             values.append((place, -1.0, 1.0))
-        elif parts & _KEPT:
+        elif parts & _KEPT and not feature.shape:
             values.append((place, 1.0, 0.0))
         else:
             raise DemosError(f"the mirror image of {feature.name} is unknown")
@@ -108,17 +101,10 @@ def evaluated_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArr
     n = sum(episodes)
     last = math.floor(share * n)
     if share and by == "episode":
-        lengths = [length for length in episodes if length]
-        if len(lengths) < 2:
-            raise DemosError(
-                "There is one episode only, so none can be held out: split by time instead of "
-                "episode."
-            )
-        last = 0
-        for length in reversed(lengths[1:]):
-            if last and last >= share * n:
-                break
-            last += length
+        ends = np.cumsum([length for length in reversed(episodes) if length])[:-1]
+        if not len(ends):
+            raise DemosError("There is one episode only, so none can be held out: split by time.")
+        last = next((end for end in ends if end >= share * n), ends[-1])
     return np.arange(n) >= n - last
 
 
@@ -163,8 +149,7 @@ def augmented(
 
     mirrored = uniform(n) < augmentation.mirror
     seen = _moved(pictures, index, mirrored, augmentation.shift, generator)
-    gain = factors(1, augmentation.gain)
-    colour = factors(seen.shape[1], augmentation.colour)
+    gain, colour = factors(1, augmentation.gain), factors(seen.shape[1], augmentation.colour)
     offset = augmentation.offset * (2.0 * uniform(n, 1, 1, 1) - 1.0)
     seen.mul_(gain * colour).add_(offset)
     if few := count(augmentation.blurred):
@@ -193,18 +178,12 @@ def _moved(
     return pixels.reshape(*places.shape, -1).permute(0, 3, 1, 2).float().div_(BRIGHTEST)
 
 
-class Batch(NamedTuple):
-    """Examples of one training step.
+Plain = tuple[NDArray[np.uint8] | None, NDArray[np.float32] | None, NDArray[Any]]
+"""Examples without augmentation: prepared images, states and targets."""
 
-    Attributes:
-        pictures: In [0, 1], shape (batch, 3, height, width); None without images.
-        states: Shape (batch, k); None without states.
-        targets: Shape (batch, m), or (batch,) for classes.
-    """
-
-    pictures: Tensor | None
-    states: Tensor | None
-    targets: Tensor
+Batch = tuple[Tensor | None, Tensor | None, Tensor]
+"""Examples of one training step: images in [0, 1], (batch, 3, height, width), states, (batch, k),
+and targets, (batch, m), or (batch,) for classes."""
 
 
 class Examples(NamedTuple):
@@ -212,22 +191,43 @@ class Examples(NamedTuple):
 
     Attributes:
         pictures: Prepared images, shape (n, height, width, 3); None without images.
-        states: Shape (n, k); None without states.
-        targets: Target outputs: actions, shape (n, m), or class indices, shape (n,).
-        mirrored_states: The mirrored states; None without states.
-        mirrored_targets: The mirrored targets.
+        states: States and mirrored states, shape (n, 2, k); None without states.
+        targets: Target outputs and their mirror images: actions, shape (n, 2, m), or class
+            indices, shape (n, 2).
     """
 
     pictures: NDArray[np.uint8] | None
     states: NDArray[np.float32] | None
     targets: NDArray[Any]
-    mirrored_states: NDArray[np.float32] | None
-    mirrored_targets: NDArray[Any]
 
-    def part(self, which: NDArray[np.bool_]) -> Examples:
-        """Return the examples selected by a mask of shape (n,)."""
-        arrays: Any = (None if array is None else array[which] for array in self)
-        return Examples(*arrays)
+    @classmethod
+    def of(
+        cls, data: Dataset, card: PolicyCard, mirrors: tuple[Mirror | None, Mirror | None]
+    ) -> Examples:
+        """Return demonstrations as a policy sees and learns them.
+
+        Args:
+            data: The demonstrations.
+            card: Card of the policy.
+            mirrors: Mirrors of actions and states; None to repeat the examples themselves.
+
+        Raises:
+            DemosError: If the demonstrations lack an input, or an action is out of range.
+        """
+        pictures, states = prepared(card, data.pictures, data.states)
+        if pictures is not None:  # PyTorch does not accept read-only arrays.
+            pictures = np.require(pictures, requirements=["C", "W"])
+        of_actions, of_states = mirrors
+        if states is not None:
+            states = np.stack((states, of_states(states) if of_states else states), axis=1)
+        both = data.actions, of_actions(data.actions) if of_actions else data.actions
+        return cls(pictures, states, np.stack([targets(card.network, x) for x in both], axis=1))
+
+    def plain(self, which: NDArray[np.bool_]) -> Plain:
+        """Return the examples selected by a mask of shape (n,), without their mirror images."""
+        pictures = None if self.pictures is None else self.pictures[which]
+        states = None if self.states is None else self.states[which, 0]
+        return pictures, states, self.targets[which, 0]
 
     def draw(self, few: Tensor, augmentation: Augmentation, generator: torch.Generator) -> Batch:
         """Return the examples with these indices, augmented."""
@@ -236,36 +236,8 @@ class Examples(NamedTuple):
         else:
             pictures = torch.as_tensor(self.pictures)
             seen, turned = augmented(pictures, few, augmentation, generator)
-
-        def select(plain: NDArray[Any], mirrored: NDArray[Any]) -> Tensor:
-            which = turned if plain.ndim == 1 else turned[:, None]
-            return torch.where(which, torch.as_tensor(mirrored)[few], torch.as_tensor(plain)[few])
-
-        states = None
-        if self.states is not None and self.mirrored_states is not None:
-            states = select(self.states, self.mirrored_states)
-        return Batch(seen, states, select(self.targets, self.mirrored_targets))
-
-
-def examples_of(
-    data: Dataset, card: PolicyCard, mirror: Mirror | None, state_mirror: Mirror | None
-) -> Examples:
-    """Return demonstrations as a policy sees and learns them, with mirror images if there are any.
-
-    Raises:
-        DemosError: If the demonstrations lack an input, or an action is out of range.
-    """
-    net = card.network
-    pictures, states = prepared(card, data.pictures, data.states)
-    if pictures is not None:  # PyTorch does not accept read-only arrays.
-        pictures = np.require(pictures, requirements=["C", "W"])
-    return Examples(
-        pictures,
-        states,
-        targets(net, data.actions),
-        states if states is None or state_mirror is None else state_mirror(states),
-        targets(net, data.actions if mirror is None else mirror(data.actions)),
-    )
+        states = None if self.states is None else torch.as_tensor(self.states)[few, turned.long()]
+        return seen, states, torch.as_tensor(self.targets)[few, turned.long()]
 
 
 def batches(
@@ -281,18 +253,14 @@ def batches(
     """
     generator = torch.Generator().manual_seed(seed)
     again = 0 if rehearsal is None else round(settings.rehearsal * settings.batch)
-    sources = [(shown, np.flatnonzero(learned), settings.batch - again)]
+    sources = [(shown, _shuffled(np.flatnonzero(learned), settings.batch - again, generator))]
     if rehearsal is not None and again:
-        sources.append((rehearsal, np.arange(len(rehearsal.targets)), again))
-    orders = [(examples, _shuffled(index, few, generator)) for examples, index, few in sources]
+        sources.append((rehearsal, _shuffled(np.arange(len(rehearsal.targets)), again, generator)))
     while True:
-        parts = [
-            examples.draw(next(order), settings.augmentation, generator)
-            for examples, order in orders
-        ]
+        parts = [few.draw(next(order), settings.augmentation, generator) for few, order in sources]
         columns: Any = zip(*parts, strict=True)
         joined: Any = (None if few[0] is None else torch.cat(few) for few in columns)
-        yield Batch(*joined)
+        yield tuple(joined)
 
 
 def _shuffled(

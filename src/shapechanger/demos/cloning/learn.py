@@ -5,13 +5,12 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.clone import CloneSettings, settings_for
 from shapechanger.demos.cloning.evaluation import AskedHead, output_fields
@@ -24,19 +23,15 @@ try:
     from torch.nn import functional
 
     from shapechanger.demos.cloning.examples import (
+        Batch,
         Examples,
         Mirror,
+        Plain,
         batches,
-        examples_of,
         mirror_of,
         stretch,
     )
-    from shapechanger.demos.cloning.network import (
-        CameraNetwork,
-        CameraPolicy,
-        joined,
-        seeded,
-    )
+    from shapechanger.demos.cloning.network import CameraPolicy, joined, seeded
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
@@ -85,23 +80,19 @@ class Training:
     Attributes:
         checks: Validations of all members, in order; the first of each is from before training.
         best_steps: Step of each member at which it was best, which was kept.
-        learned: Number of demonstrated steps learned from.
-        mirrored: Share of examples that were mirrored.
-        mirror_note: Reason for that share, in a sentence; "" if the settings state the share.
+        mirror_note: Share of mirrored images and its reason, in a sentence; "" if the settings
+            state the share.
         seconds: Duration, s.
     """
 
     checks: tuple[MemberCheck, ...]
     best_steps: tuple[int, ...]
-    learned: int
-    mirrored: float
     mirror_note: str
     seconds: float
 
 
 def learn(
     data: Dataset,
-    learned: NDArray[np.bool_] | None = None,
     *,
     settings: CloneSettings | None = None,
     head: AskedHead = "auto",
@@ -120,7 +111,6 @@ def learn(
 
     Args:
         data: The demonstrations.
-        learned: Mask of the steps to learn from, shape (n,); None for all.
         settings: Hyperparameters; None for `settings_for` the number of steps.
         head: Kind of output.
         inputs: Inputs of the policy.
@@ -144,11 +134,9 @@ def learn(
     """
     seed = check_seed(seed, DemosError)
     began = time.monotonic()
-    which = np.ones(len(data), np.bool_) if learned is None else learned
-    if (wrong := which & ~np.isfinite(data.actions).all(axis=1)).any():
+    if (wrong := ~np.isfinite(data.actions).all(axis=1)).any():
         first = int(wrong.argmax())
         raise DemosError(f"Action {first} must be finite, got {data.actions[first].tolist()}.")
-    data = data.part(which)
     if not len(data):
         raise DemosError("There is no step to learn from.")
     settings = settings_for(len(data)) if settings is None else settings
@@ -157,37 +145,14 @@ def learn(
     else:
         start.card.require_layouts(data.action_layout, data.state_layout)
         sees, feels = start.net.eyes != "none", bool(start.net.nerves)
-    mirror, state_mirror, share, note = _mirrors(data, feels)
-    if symmetric and mirror is not None:
-        share, note = settings.augmentation.mirror, ""
-    mirror = mirror if share else None
-    settings = msgspec.structs.replace(
-        settings, augmentation=msgspec.structs.replace(settings.augmentation, mirror=share)
-    )
-    if start is not None:
-        card = start.card
-    else:
-        net = CloneNetwork(
-            framing=settings.framing,
-            channels=settings.channels,
-            features=settings.features,
-            eyes=settings.eyes if sees else "none",
-            nerves=settings.nerves if feels else (),
-            unseen=_unseen(data) if feels else (),
-            **output_fields(
-                data.actions, data.action_layout, head, mirror and mirror(data.actions)
-            ),
-        )
-        card = PolicyCard(
-            learner="cloning",
-            observation=data.state_layout if feels else None,
-            action=data.action_layout,
-            clone=net,
-        )
-    shown = examples_of(data, card, mirror, state_mirror)
-    again = None if rehearsal is None else examples_of(rehearsal, card, mirror, state_mirror)
+    mirrors, share, note = _mirrors(data, feels, settings.augmentation.mirror if symmetric else -1)
+    augmentation = msgspec.structs.replace(settings.augmentation, mirror=share)
+    settings = msgspec.structs.replace(settings, augmentation=augmentation)
+    card = _card(data, settings, head, sees, feels, mirrors[0]) if start is None else start.card
+    shown = Examples.of(data, card, mirrors)
+    again = None if rehearsal is None else Examples.of(rehearsal, card, mirrors)
     members = settings.members if start is None else 1
-    networks: list[CameraNetwork] = []
+    policies: list[CameraPolicy] = []
     checks: list[MemberCheck] = []
     steps: list[int] = []
     validated: list[tuple[Tensor, Tensor]] = []
@@ -201,14 +166,18 @@ def learn(
             on_check(checks[-1])
 
         with seeded(own_seed):  # Dropout draws from the global generator.
-            steps.append(_fit(policy, shown, again, settings, kept_back, own_seed, report))
-        networks.append(policy.network)
-        validated.append(_validation(policy, shown.part(kept_back)))
-    net = card.network
-    net = msgspec.structs.replace(
-        net, members=net.members if members == 1 else members, seeds=(*net.seeds, seed)
-    )
+            drawn = batches(shown, ~kept_back, again, settings, own_seed)
+            if not card.network.seeds:
+                _begin(policy, shown.plain(~kept_back))
+            validation = shown.plain(kept_back)
+            steps.append(_fit(policy, drawn, validation, int((~kept_back).sum()), settings, report))
+        policies.append(policy)
+        validated.append(_validated(policy, validation))
+    net = msgspec.structs.replace(card.network, seeds=(*card.network.seeds, seed))
+    if members > 1:
+        net = msgspec.structs.replace(net, members=members)
     card = msgspec.structs.replace(card, clone=net, seed=seed, steps=len(data), settings=settings)
+    networks = [policy.network for policy in policies]
     whole = networks[0] if members == 1 else joined(card, networks)
     if net.classes:
         # Scale the logits so that confidence matches accuracy on held-out steps.
@@ -216,8 +185,7 @@ def learn(
         with torch.no_grad():
             whole.hands.weight.div_(temperature)
             whole.hands.bias.div_(temperature)
-    seconds = time.monotonic() - began
-    training = Training(tuple(checks), tuple(steps), len(data), share, note, seconds)
+    training = Training(tuple(checks), tuple(steps), note, time.monotonic() - began)
     return CameraPolicy(whole, card), training
 
 
@@ -233,38 +201,63 @@ def _inputs_of(data: Dataset, inputs: Inputs) -> tuple[bool, bool]:
     return sees, feels
 
 
-def _mirrors(data: Dataset, feels: bool) -> tuple[Mirror | None, Mirror | None, float, str]:
-    """Return the mirrors of actions and states, the share to mirror, and the reason for it."""
+def _mirrors(
+    data: Dataset, feels: bool, stated: float
+) -> tuple[tuple[Mirror | None, Mirror | None], float, str]:
+    """Return the mirrors of actions and states, the share to mirror, and the reason for it.
+
+    A stated share of at least 0 is kept, unless a mirror image is unknown.
+    """
     try:
         mirror = mirror_of(data.action_layout)
         layout = data.state_layout
         of_states = mirror_of(layout) if feels and layout is not None else None
     except DemosError as reason:
-        return None, None, 0.0, f"No image is mirrored, because {reason}."
+        return (None, None), 0.0, f"No image is mirrored, because {reason}."
     balance = mirror.balance(data.actions)
-    share = 0.5 * balance
-    note = (
-        f"{share:.1%} of the images are mirrored, because the driver steered to one side "
-        f"{balance:.1%} as much as to the other: the mirror image of a one-sided drive would teach "
-        "the wrong side."
-    )
-    return mirror, of_states, share, note
+    share, note = stated, ""
+    if stated < 0.0:
+        share = 0.5 * balance
+        note = (
+            f"{share:.1%} of the images are mirrored, because the driver steered to one side "
+            f"{balance:.1%} as much as to the other: the mirror image of a one-sided drive would "
+            "teach the wrong side."
+        )
+    return (mirror if share else None, of_states), share, note
 
 
-def _unseen(data: Dataset) -> tuple[str, ...]:
-    """Return the names of the state values to ignore."""
-    names = () if data.state_layout is None else data.state_layout.names
+def _card(
+    data: Dataset,
+    settings: CloneSettings,
+    head: AskedHead,
+    sees: bool,
+    feels: bool,
+    mirror: Mirror | None,
+) -> PolicyCard:
+    """Return the card of a new policy for demonstrations."""
+    names = data.state_layout.names if feels and data.state_layout is not None else ()
     unseen = tuple(name for name in names if name.endswith(_APPLIED))
-    if len(unseen) == len(names):
+    if names and len(unseen) == len(names):
         raise DemosError(
             "The state contains only the previous action, from which nothing can be learned."
         )
-    return unseen
+    net = CloneNetwork(
+        framing=settings.framing,
+        channels=settings.channels,
+        features=settings.features,
+        eyes=settings.eyes if sees else "none",
+        nerves=settings.nerves if feels else (),
+        unseen=unseen,
+        **output_fields(data.actions, data.action_layout, head, mirror and mirror(data.actions)),
+    )
+    state = data.state_layout if feels else None
+    return PolicyCard(learner="cloning", observation=state, action=data.action_layout, clone=net)
 
 
-def _validation(policy: CameraPolicy, shown: Examples) -> tuple[Tensor, Tensor]:
+def _validated(policy: CameraPolicy, shown: Plain) -> tuple[Tensor, Tensor]:
     """Return the outputs of the last layer for examples, and their targets."""
-    return policy.logits(shown.pictures, shown.states), torch.as_tensor(shown.targets)
+    pictures, states, targets = shown
+    return policy.logits(pictures, states), torch.as_tensor(targets)
 
 
 def _loss(out: Tensor, target: Tensor, smoothing: float = 0.0) -> Tensor:
@@ -274,49 +267,39 @@ def _loss(out: Tensor, target: Tensor, smoothing: float = 0.0) -> Tensor:
     return functional.smooth_l1_loss(torch.tanh(out), target, beta=_HUBER_BETA)
 
 
-def _begin(policy: CameraPolicy, shown: Examples) -> None:
+def _begin(policy: CameraPolicy, shown: Plain) -> None:
     """Initialise the output to the mean action or the frequencies, and normalise the states."""
-    network = policy.network
+    network, (_, states, targets) = policy.network, shown
     with torch.no_grad():
         if policy.net.classes:
-            counts = np.bincount(shown.targets, minlength=len(policy.net.classes)) + 1.0
+            counts = np.bincount(targets, minlength=len(policy.net.classes)) + 1.0
             network.hands.weight.zero_()
             network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
         else:
-            mean = torch.as_tensor(shown.targets.mean(axis=0))
+            mean = torch.as_tensor(targets.mean(axis=0))
             network.hands.bias.copy_(torch.atanh(mean.clamp(-_MAX_INITIAL, _MAX_INITIAL)))
-        if shown.states is None:
-            return
-        # Statistics of the finite values only.
-        known = np.where(np.isfinite(shown.states), shown.states, np.nan)
-        there: NDArray[np.bool_] = np.isfinite(known).sum(axis=0) > 0
-        middle, spread = np.zeros(known.shape[1]), np.ones(known.shape[1])
-        middle[there] = np.nanmean(known[:, there], axis=0)
-        found = np.nanstd(known[:, there], axis=0)
-        spread[there] = np.where(found > _MIN_SPREAD, found, 1.0)
-        for name, values in (("middle", middle), ("spread", spread)):
-            getattr(network.nerves, name).copy_(torch.as_tensor(values))
+        if states is not None:
+            known = np.where(np.isfinite(states), states, np.nan)
+            measured = np.isfinite(known).any(axis=0)
+            middle, spread = (f(known[:, measured], axis=0) for f in (np.nanmean, np.nanstd))
+            spread = np.where(spread > _MIN_SPREAD, spread, 1.0)
+            for name, values in (("middle", middle), ("spread", spread)):
+                getattr(network.nerves, name)[measured] = torch.as_tensor(values)
 
 
 def _fit(
     policy: CameraPolicy,
-    shown: Examples,
-    rehearsal: Examples | None,
+    drawn: Iterator[Batch],
+    validation: Plain,
+    learned: int,
     settings: CloneSettings,
-    kept_back: NDArray[np.bool_],
-    seed: int,
     report: Callable[[int, float, float], None],
 ) -> int:
     """Train the network of a policy in place to its best weights, and return their step."""
-    network, rate = policy.network, settings.further_rate
-    if not policy.net.seeds:
-        rate = settings.learning_rate
-        _begin(policy, shown.part(~kept_back))
-    drawn = batches(shown, ~kept_back, rehearsal, settings, seed)
-    validation = shown.part(kept_back)
+    network = policy.network
+    rate = settings.further_rate if policy.net.seeds else settings.learning_rate
     optimizer = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=settings.weight_decay)
-    n = len(validation.targets)
-    total = settings.steps(len(kept_back) - n)
+    total = settings.steps(learned)
     every = max(total // settings.checks, 1)
     # The network to validate and keep: the trained one, or a copy with averaged weights.
     kept = CameraPolicy(copy.deepcopy(network) if settings.averaging else network, policy.card)
@@ -327,8 +310,8 @@ def _fit(
         if step % every == 0 or step == total:
             kept.network.eval()
             error = math.nan
-            if n:
-                error = float(_loss(*_validation(kept, validation)))
+            if len(validation[2]):
+                error = float(_loss(*_validated(kept, validation)))
             report(step, sum(losses) / len(losses) if losses else math.nan, error)
             losses.clear()
             worse += 1
@@ -341,10 +324,11 @@ def _fit(
         for group in optimizer.param_groups:
             group["lr"] = rate * _share_of_rate(step, total, settings.warm_up)
         network.train()
-        batch = next(drawn)
-        found = network.perceive(batch.pictures, batch.states)
-        out = network.hands(functional.dropout(found, settings.dropout))
-        loss = _loss(out, batch.targets, settings.smoothing)
+        pictures, states, targets = next(drawn)
+        found = network.perceive(pictures, states)
+        loss = _loss(
+            network.hands(functional.dropout(found, settings.dropout)), targets, settings.smoothing
+        )
         optimizer.zero_grad()
         loss.backward()  # pyright: ignore[reportUnknownMemberType]
         torch.nn.utils.clip_grad_norm_(network.parameters(), _MAX_GRADIENT)
