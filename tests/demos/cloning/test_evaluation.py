@@ -70,7 +70,7 @@ def test_only_the_chosen_steps_are_evaluated(keys: CameraPolicy) -> None:
 
 def test_regression_is_correct_in_the_same_third() -> None:
     actions = np.array([[-1.0, 1.0], [-0.4, 0.4], [0.2, 0.0], [0.4, -0.9]])
-    names, numbers = tercile_classes(actions, STEERS)
+    names, numbers = tercile_classes(actions, STEERS, actions)
     assert [names[i] for i in numbers] == [
         "left forward",
         "left forward",

@@ -14,7 +14,7 @@ from stable_baselines3 import PPO, SAC
 
 from shapechanger.demos.cloning.learn import Inputs, learn
 from shapechanger.demos.cloning.network import CameraPolicy
-from shapechanger.demos.cloning.sb3 import ChosenActions, NormedReLU, as_ppo, as_sac
+from shapechanger.demos.cloning.sb3 import NormedReLU, as_ppo, as_sac
 from shapechanger.errors import PolicyError
 from shapechanger.layout import Layout
 from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
@@ -99,7 +99,10 @@ def test_ppo_predicts_like_the_clone_and_learns(inputs: Inputs, tmp_path: Path) 
 def test_ppo_chooses_the_classes_of_a_clone(tmp_path: Path) -> None:
     policy, data = _policy(KEYS), stripes(16, 1)
     as_ppo(policy, _SIZE, n_steps=8, batch_size=8, n_epochs=1).save(tmp_path / "ppo.zip")
-    model = PPO.load(tmp_path / "ppo.zip", env=ChosenActions(_World(KEYS, "picture"), policy))
+    classes = np.asarray(policy.net.classes, np.float32)
+    space = gym.spaces.Discrete(len(classes))
+    env = gym.wrappers.TransformAction(_World(KEYS, "picture"), classes.__getitem__, space)
+    model = PPO.load(tmp_path / "ppo.zip", env=env)
     chosen = model.predict(data.pictures, deterministic=True)[0]
     np.testing.assert_array_equal(
         np.asarray(policy.net.classes)[chosen], policy.predict_many(data.pictures)

@@ -35,22 +35,21 @@ OUT_OF_RANGE: Final = "out of range"
 
 
 def tercile_classes(
-    actions: NDArray[np.float64], layout: Layout, driver: NDArray[np.float64] | None = None
+    actions: NDArray[np.float64], layout: Layout, driver: NDArray[np.float64]
 ) -> tuple[list[str], NDArray[np.int64]]:
     """Classify actions by the third of its range that each value is in.
 
-    Each combination of thirds that occurs is a class. The extremes of the driver's actions, or of
-    `actions`, replace missing bounds. An action with a value outside its range, by more than the
-    tolerance, is in the class `OUT_OF_RANGE`.
+    Each combination of thirds that occurs is a class. The extremes of the driver's actions replace
+    missing bounds. An action with a value outside its range, by more than the tolerance, is in the
+    class `OUT_OF_RANGE`.
 
     Returns:
         The names of the classes, and the class index of each action, shape (n,).
     """
-    low, high = _ranges(actions if driver is None else driver, layout)
+    low, high = _ranges(driver, layout)
     share = (actions - low) / np.where(high > low, high - low, 1.0)
     third = (share > 1.0 / 3.0).astype(np.int64) + (share > 2.0 / 3.0)
-    outside = ~(np.abs(share - 0.5) <= 0.5 * (1.0 + _TOLERANCE)).all(axis=1)
-    third[outside] = -1
+    third[~(np.abs(share - 0.5) <= 0.5 * (1.0 + _TOLERANCE)).all(axis=1)] = -1
     found, numbers = np.unique(third, axis=0, return_inverse=True)
     parts = [name for feature in layout for name in [feature.name] * feature.size]
 
@@ -91,25 +90,27 @@ def output_fields(
     """
     both = actions if mirrored is None else np.concatenate((actions, mirrored))
     different, counts = np.unique(both, axis=0, return_counts=True)
-    few = len(different) <= _MOST_CLASSES and _MIN_REPEATS * len(different) <= len(actions)
     if asked == "class" and len(different) > _MOST_CLASSES:
         raise DemosError(
             f"There are {len(different)} different actions, but at most {_MOST_CLASSES} classes "
             "are supported: choose the head regression."
         )
-    if len(np.unique(actions, axis=0)) < 2 and asked != "regression":
+    if (actions == actions[0]).all() and asked != "regression":
         raise DemosError(
             f"All of {len(actions)} actions are equal ({named(actions[0], layout)}), so there is "
             "nothing to learn."
         )
+    few = len(different) <= _MOST_CLASSES and _MIN_REPEATS * len(different) <= len(actions)
     if asked == "class" or (asked == "auto" and few):
         order = np.argsort(-counts, kind="stable")
-        classes = tuple(tuple(map(float, different[i])) for i in order)
-        names = tuple(named(np.asarray(c), layout) for c in classes)
-        return {"classes": classes, "class_names": names}
+        classes = [tuple(map(float, action)) for action in different[order]]
+        return {
+            "classes": tuple(classes),
+            "class_names": tuple(named(np.asarray(each), layout) for each in classes),
+        }
     low, high = _ranges(both, layout)
     high = np.where(high > low, high, low + 1.0)  # For a constant value.
-    return {"low": tuple(map(float, low)), "high": tuple(map(float, high))}
+    return {"low": tuple(low.tolist()), "high": tuple(high.tolist())}
 
 
 def named(action: NDArray[np.floating], layout: Layout) -> str:
@@ -118,8 +119,7 @@ def named(action: NDArray[np.floating], layout: Layout) -> str:
     if len(parts) != len(action):
         return " ".join(f"{value:g}" for value in action)
     if {"forward", "left"} <= set(parts) and set(action.tolist()) <= {0.0, 1.0}:
-        held = [part for part, value in zip(parts, action, strict=True) if value]
-        return "+".join(held) or "none"
+        return "+".join(part for part, value in zip(parts, action, strict=True) if value) or "none"
     return ", ".join(f"{part} {value:g}" for part, value in zip(parts, action, strict=True))
 
 
@@ -204,56 +204,51 @@ def evaluate(
     target = data.actions[chosen].astype(np.float64)
     out = policy.outputs(pictures, states)
     predicted = policy.predict_many(pictures, states).astype(np.float64)
-    layout = data.action_layout
+    layout, classes = data.action_layout, policy.net.classes
     apart = np.abs(predicted - target)
     # Ranges of the driver alone: an absurd output would widen them, so that all others seem right.
     low, high = _ranges(target, layout)
-    half = 0.5 * (high - low)
-    relative = apart / np.where(half > 0.0, half, 1.0)
-    absurd: NDArray[np.bool_] | None = None
-    calibration: tuple[Bin, ...] = ()
-    ece: float | None = None
-    if policy.net.classes:
-        did, truth = out.argmax(axis=1), class_numbers(target, policy.net.classes)
+    relative = apart / np.where(high > low, 0.5 * (high - low), 1.0)
+    absurd, calibration, ece = None, (), None
+    if classes:
+        did, truth = out.argmax(axis=1), class_numbers(target, classes)
         names = list(policy.net.class_names)
-        for step in np.flatnonzero(truth < 0):  # Actions that are unknown to the policy.
+        # The probability of an unknown action is 0.
+        given = np.where(truth < 0, 0.0, out[np.arange(len(out)), truth])
+        for step in np.flatnonzero(truth < 0):
             name = named(target[step], layout)
-            if name not in names:
-                names.append(name)
+            names += [] if name in names else [name]
             truth[step] = names.index(name)
         calibration, ece = _calibration(out, did == truth)
-        # The probability of an unknown action is 0.
-        known = np.where(truth < out.shape[1], truth, 0)
-        given = np.where(truth < out.shape[1], out[np.arange(len(out)), known], 0.0)
         wrongness = 1.0 - given + (did != truth)
     else:
         both = np.concatenate((np.clip(target, low, high), predicted))
         names, numbers = tercile_classes(both, layout, target)
-        truth, did = numbers[: len(target)], numbers[len(target) :]
+        truth, did = np.split(numbers, 2)
         absurd = did == (names.index(OUT_OF_RANGE) if OUT_OF_RANGE in names else -1)
         wrongness = relative.max(axis=1)
     confusion = np.zeros((len(names), len(names)), np.int64)
     np.add.at(confusion, (truth, did), 1)
     # Evenly spaced steps, in order.
-    points = 0 if policy.net.classes else min(len(target), _MAX_POINTS)
+    points = 0 if classes else min(len(target), _MAX_POINTS)
     shown = np.unique(np.linspace(0, len(target) - 1, points).round().astype(np.int64))
     return EvaluationResult(
-        head="class" if policy.net.classes else "regression",
+        head="class" if classes else "regression",
         steps=len(target),
         accuracy=float((truth == did).mean()),
         macro_f1=macro_f1(did, truth, absurd),
         majority_baseline=float(confusion.sum(axis=1).max() / len(target)),
         classes=tuple(names),
-        confusion=tuple(tuple(map(int, row)) for row in confusion),
+        confusion=tuple(map(tuple, confusion.tolist())),
         calibration=calibration,
         ece=ece,
         numbers=layout.names,
-        errors=tuple(map(float, apart.mean(axis=0))),
+        errors=tuple(apart.mean(axis=0).tolist()),
         within=float((relative <= _TOLERANCE).all(axis=1).mean()),
         tolerance=_TOLERANCE,
-        worst=tuple(map(int, chosen[np.argsort(-wrongness, kind="stable")[:_WORST]])),
-        predicted=tuple(tuple(map(float, row)) for row in predicted[shown]),
-        target=tuple(tuple(map(float, row)) for row in target[shown]),
+        worst=tuple(chosen[np.argsort(-wrongness, kind="stable")[:_WORST]].tolist()),
+        predicted=tuple(map(tuple, predicted[shown].tolist())),
+        target=tuple(map(tuple, target[shown].tolist())),
     )
 
 

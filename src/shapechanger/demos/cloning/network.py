@@ -147,7 +147,7 @@ class CameraNetwork(nn.Module):
 
     def __init__(self, card: PolicyCard) -> None:
         super().__init__()
-        net, feels = card.network, card.observation
+        self.card, net, feels = card, card.network, card.observation
         self.seen = 0 if net.eyes == "none" else net.members * net.features
         self.felt = 0 if feels is None else net.members * net.nerves[-1]
         eyes = [Eyes(net) for _ in range(net.members) if self.seen]
@@ -163,6 +163,21 @@ class CameraNetwork(nn.Module):
         given = ((self.eyes, pictures), (self.nerves, states))
         found = [encoder(part) for encoder, part in given if encoder is not None]
         return found[0] if len(found) == 1 else torch.cat(found, dim=1)
+
+    @torch.no_grad()
+    def features(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None
+    ) -> Tensor:
+        """Return the features, as `perceive` does, of raw images and states."""
+        small, known = prepared(self.card, pictures, states)
+        n = len(small) if small is not None else len(known) if known is not None else 0
+        found = next(self.parameters()).new_empty(n, self.seen + self.felt)
+        for start in range(0, n, _CHUNK):
+            some = slice(start, start + _CHUNK)
+            parts = (None if x is None else torch.tensor(x[some]) for x in (small, known))
+            seen, felt = (None if x is None else x.to(found.device) for x in parts)
+            found[some] = self.perceive(None if seen is None else scaled(seen), felt)
+        return found
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return the outputs, as `Clone.outputs` does, for prepared images, a state, or both."""
@@ -235,17 +250,8 @@ class CameraPolicy(Clone):
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> Tensor:
         """Return the outputs of the last layer, from which `outputs` are computed."""
-        small, known = prepared(self.card, pictures, states)
-        n = len(small) if small is not None else len(known) if known is not None else 0
-        found = torch.empty(n, self.network.hands.in_features)
         with torch.inference_mode():
-            for start in range(0, n, _CHUNK):
-                some = slice(start, start + _CHUNK)
-                found[some] = self.network.perceive(
-                    None if small is None else scaled(torch.as_tensor(small[some].copy())),
-                    None if known is None else torch.as_tensor(known[some]),
-                )
-            return self.network.hands(found)
+            return self.network.hands(self.network.features(pictures, states))
 
     def copy(self) -> CameraPolicy:
         """Return a policy that shares no weights with this one."""

@@ -13,12 +13,10 @@ import msgspec
 import numpy as np
 import torch
 from gymnasium import spaces
-from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from shapechanger.demos.cloning.clone import HALF, area_shares, first_row
-from shapechanger.demos.cloning.network import BRIGHTEST, CameraNetwork, CameraPolicy
+from shapechanger.demos.cloning.network import CameraNetwork, CameraPolicy
 from shapechanger.errors import MissingExtra, PolicyError
 from shapechanger.policy import PolicyCard
 
@@ -29,8 +27,6 @@ try:
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
-_IMAGE: Final = "image"
-_STATE: Final = "state"
 # Logarithm of the initial standard deviation of an action before it is squashed. A larger one would
 # drown the actions of the clone in noise.
 _LOG_STD: Final = -2.0
@@ -59,46 +55,31 @@ class ClonedPerception(BaseFeaturesExtractor):
     """
 
     def __init__(self, observation_space: Any, card: str) -> None:
-        known = msgspec.json.decode(card, type=PolicyCard)
-        net, layout, network = known.network, known.observation, CameraNetwork(known)
+        network = CameraNetwork(msgspec.json.decode(card, type=PolicyCard))
         super().__init__(observation_space, network.hands.in_features)  # pyright: ignore[reportUnknownMemberType]
-        self.eyes, self.nerves, self.network = network.eyes, network.nerves, network
-        self._unseen = [layout.slices[name] for name in net.unseen if layout is not None]
-        if net.eyes != "none":
-            space = observation_space
-            image = space[_IMAGE] if isinstance(space, spaces.Dict) else space
-            _, height, width = cast("tuple[int, int, int]", image.shape)  # Channels first in SB3.
-            self._first = first_row(height, net.framing)
-            rows = area_shares(height - self._first, net.framing.height)
-            self.register_buffer("rows", torch.as_tensor(rows), persistent=False)
-            columns = area_shares(width, net.framing.width)
-            self.register_buffer("columns", torch.as_tensor(columns), persistent=False)
+        self.network = network
         del network.hands
         self.requires_grad_(False)
 
     def forward(self, observations: Tensor | dict[str, Tensor]) -> Tensor:
         """Return the features, shape (n, features)."""
         if not isinstance(observations, dict):
-            observations = {_STATE if self.eyes is None else _IMAGE: observations}
-        pictures, states = observations.get(_IMAGE), observations.get(_STATE)
-        if pictures is not None:  # Reduce them as `clone.prepare` does.
-            rows, columns = cast("Tensor", self.rows), cast("Tensor", self.columns)
-            seen = rows @ pictures[:, :, self._first :] @ columns.T
-            pictures = torch.floor(seen + HALF) / BRIGHTEST
-        if states is not None and self._unseen:
-            states = states.clone()
-            for place in self._unseen:
-                states[:, place] = torch.nan
-        return self.network.perceive(pictures, states)
+            observations = {"image" if self.network.seen else "state": observations}
+        pictures, states = observations.get("image"), observations.get("state")
+        return self.network.features(  # Stable-Baselines3 has colours first, and numbers as floats.
+            None if pictures is None else pictures.permute(0, 2, 3, 1).byte().numpy(force=True),
+            None if states is None else states.numpy(force=True),
+        )
 
 
 class _Between(nn.Module):
     """Map from (-inf, inf) to the range of the actions."""
 
-    def __init__(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> None:
+    def __init__(self, space: Any) -> None:
         super().__init__()
-        self.register_buffer("low", torch.as_tensor(low), persistent=False)
-        self.register_buffer("half_range", torch.as_tensor(0.5 * (high - low)), persistent=False)
+        low, high = (torch.as_tensor(end.astype(np.float32)) for end in (space.low, space.high))
+        self.register_buffer("low", low, persistent=False)
+        self.register_buffer("half_range", 0.5 * (high - low), persistent=False)
 
     def forward(self, x: Tensor) -> Tensor:
         return cast("Tensor", self.low) + (torch.tanh(x) + 1.0) * cast("Tensor", self.half_range)
@@ -111,27 +92,7 @@ class ClonedPolicy(ActorCriticPolicy):
         super()._build(lr_schedule)
         space = cast("Any", self).action_space
         if isinstance(space, spaces.Box):
-            space = cast("Any", space)
-            squashed = _Between(space.low.astype(np.float32), space.high.astype(np.float32))
-            self.action_net = nn.Sequential(self.action_net, squashed)
-
-
-class ChosenActions(gym.ActionWrapper[Any, Any, Any]):
-    """Env wrapper whose actions are the class indices of a policy.
-
-    Args:
-        env: Env that takes the actions of the classes.
-        policy: The policy.
-    """
-
-    def __init__(self, env: gym.Env[Any, Any], policy: CameraPolicy) -> None:
-        super().__init__(env)
-        self._classes = np.asarray(policy.net.classes, np.float32)
-        self.action_space = spaces.Discrete(len(self._classes))
-
-    def action(self, action: Any) -> NDArray[np.float32]:
-        """Return the action of a class."""
-        return self._classes[int(action)].copy()
+            self.action_net = nn.Sequential(self.action_net, _Between(space))
 
 
 def as_sac(
@@ -152,10 +113,7 @@ def as_sac(
         PolicyError: If the policy has classes, which SAC does not support.
     """
     if policy.net.classes:
-        raise PolicyError(
-            "This policy has classes, which SAC does not support: use PPO, or train it with the "
-            "head regression."
-        )
+        raise PolicyError("This policy has classes, but SAC needs the head regression: use PPO.")
     settings = {"learning_starts": 0, "buffer_size": _BUFFER, "device": "cpu", **settings}
     kwargs = _perception(policy) | {
         # No layer between features and actions, as in the policy.
@@ -167,12 +125,10 @@ def as_sac(
     kind = "MultiInputPolicy" if isinstance(env.observation_space, spaces.Dict) else "MlpPolicy"
     model = SAC(kind, env, seed=seed, policy_kwargs=kwargs, **settings)
     actor = cast("Any", model.actor)
-    actor.mu.load_state_dict(policy.network.hands.state_dict())
     with torch.no_grad():
         actor.log_std.weight.zero_()
         actor.log_std.bias.fill_(_LOG_STD)
-    for owner in (model.actor, model.critic, model.critic_target):
-        _copy_encoders(cast("Any", owner).features_extractor, policy)
+    _copy_weights(policy, actor.mu, model.actor, model.critic, model.critic_target)
     return model
 
 
@@ -181,7 +137,8 @@ def as_ppo(
 ) -> PPO:
     """Return the policy as a PPO model on raw observations, as `as_sac` does.
 
-    The actions of a policy with classes are class indices; wrap the env in `ChosenActions`.
+    The actions of a policy with classes are indices of `policy.net.classes`: wrap the env in
+    `gymnasium.wrappers.TransformAction`.
 
     Args:
         policy: The policy.
@@ -195,9 +152,7 @@ def as_ppo(
         kwargs["log_std_init"] = _LOG_STD
     model = PPO(ClonedPolicy, _Spaces(policy, size), seed=seed, policy_kwargs=kwargs, **settings)
     acting = cast("Any", model.policy)
-    net = acting.action_net if policy.net.classes else acting.action_net[0]
-    net.load_state_dict(policy.network.hands.state_dict())
-    _copy_encoders(acting.features_extractor, policy)
+    _copy_weights(policy, acting.action_net if policy.net.classes else acting.action_net[0], acting)
     return model
 
 
@@ -210,9 +165,9 @@ class _Spaces(gym.Env[Any, Any]):
         if net.eyes != "none":
             if size is None:
                 raise PolicyError("The size of the images is needed for this policy.")
-            parts[_IMAGE] = spaces.Box(0, 255, (*size, 3), np.uint8)
+            parts["image"] = spaces.Box(0, 255, (*size, 3), np.uint8)
         if card.observation is not None:
-            parts[_STATE] = spaces.Box(-np.inf, np.inf, (card.observation.size,), np.float32)
+            parts["state"] = spaces.Box(-np.inf, np.inf, (card.observation.size,), np.float32)
         whole = spaces.Dict(parts)
         self.observation_space = whole if len(parts) > 1 else next(iter(parts.values()))
         if net.classes:
@@ -232,7 +187,10 @@ def _perception(policy: CameraPolicy) -> dict[str, Any]:
     }
 
 
-def _copy_encoders(perception: ClonedPerception, policy: CameraPolicy) -> None:
+def _copy_weights(policy: CameraPolicy, hands: nn.Module, *owners: Any) -> None:
+    """Copy the output layer of a policy, and its encoders to the owners of a perception."""
+    hands.load_state_dict(policy.network.hands.state_dict())
     state = policy.network.state_dict()
     known = {name: value for name, value in state.items() if not name.startswith("hands.")}
-    perception.network.load_state_dict(known)
+    for owner in owners:
+        owner.features_extractor.network.load_state_dict(known)
