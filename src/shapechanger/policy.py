@@ -195,26 +195,15 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def shapes(self) -> dict[str, list[int]]:
         """Shapes of the inputs and the output of an ONNX file, without their first axis."""
-        net, size = self.clone, 0 if self.observation is None else self.observation.size
-        if net is None:
-            return {"observation": [size], "action": [self.action_size]}
-        shapes: dict[str, list[int]] = {}
-        if net.eyes != "none":
-            shapes["picture"] = list(net.framing.shape)
-        if size:
-            shapes["state"] = [size]
+        if (net := self.clone) is None:
+            return {"observation": [self.layouts[0].size], "action": [self.action_size]}
+        shapes = {} if net.eyes == "none" else {"picture": list(net.framing.shape)}
+        if self.observation is not None:
+            shapes["state"] = [self.observation.size]
         return shapes | {"output": [len(net.classes) or self.action_size]}
 
     def require_layouts(self, actions: Layout, state: Layout | None = None) -> None:
-        """Refuse a robot, an env or data with layouts that differ from the layouts of a clone.
-
-        Args:
-            actions: Layout of its actions.
-            state: Layout of its state; None without a state.
-
-        Raises:
-            PolicyError: If the layouts differ.
-        """
+        """Raise PolicyError for a robot, an env or data with other layouts than a clone has."""
         mine, theirs = map(_text, (self.action, actions))
         if self.action is None:
             mine, theirs = ", ".join(STEERING), ", ".join(actions.names)

@@ -12,13 +12,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import (
-    DRIVERS,
-    EpisodeHeader,
-    Step,
-    episodes_of,
-    read_episode,
-)
+from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step, episodes_of, read_episode
 from shapechanger.demos.episodes.records import is_episode
 from shapechanger.demos.exchange import import_episodes
 from shapechanger.demos.jpeg import decode_picture
@@ -77,10 +71,10 @@ class Dataset:
     @property
     def duration_s(self) -> float:
         """Duration, s; the last step of an episode lasts one period."""
-        ends = np.cumsum(self.episodes)
-        begins = ends - np.asarray(self.episodes)
-        total = float((self.times_s[ends - 1] - self.times_s[begins]).sum())
-        return total + (len(ends) / self.control_hz if self.control_hz > 0.0 else 0.0)
+        lengths = np.asarray(self.episodes)
+        ends = np.cumsum(lengths)
+        driven = self.times_s[ends - 1] - self.times_s[ends - lengths]
+        return float(driven.sum()) + len(ends) / self.control_hz
 
     def part(self, which: NDArray[np.bool_]) -> Dataset:
         """Return the steps that a mask of shape (n,) selects."""
@@ -112,10 +106,7 @@ def merged(datasets: Sequence[Dataset]) -> Dataset:
 
 
 def load_dataset(
-    data: Path,
-    *,
-    drivers: Collection[str] = DEMONSTRATORS,
-    shrink: Shrink | None = None,
+    data: Path, *, drivers: Collection[str] = DEMONSTRATORS, shrink: Shrink | None = None
 ) -> Dataset:
     """Read demonstrations in any supported format.
 
@@ -135,39 +126,25 @@ def load_dataset(
         if driver not in DRIVERS:
             raise UnknownName("driver", driver, DRIVERS)
     parts: list[Dataset] = []
-    kinds: list[tuple[str, dict[str, object], float]] = []
+    kinds: list[dict[str, object]] = []
     periods_s: list[float] = []
     for name, header, steps in _episodes(data):
-        chosen, pictures = _chosen(name, header, steps, drivers, shrink)
-        if not chosen:
+        part, periods = _part(name, header, steps, drivers, shrink)
+        if part is None:
             continue
         kind: dict[str, object] = {"actions": header.action_layout, "states": header.state_layout}
-        kind["pictures"] = (header.image_size, bool(pictures))
-        kinds.append((name, kind, header.control_hz))
-        other = [what for what, value in kinds[0][1].items() if kind[what] != value]
-        if not is_same_rate(header.control_hz, kinds[0][2]):
+        kind["pictures"] = (header.image_size, part.pictures is None)
+        kinds.append({"name": name, **kind})
+        parts.append(part)
+        periods_s += periods
+        other = [what for what, value in kind.items() if kinds[0][what] != value]
+        if not is_same_rate(header.control_hz, parts[0].control_hz):
             other.append("steps a second")
         if other:
             raise DemosError(
-                f"{name} has other {other[0]} than {kinds[0][0]}: learn from one kind at a time."
+                f"{name} has other {other[0]} than {kinds[0]['name']}: learn from one kind at a "
+                "time."
             )
-        times_s, are_known = _times_s(chosen, header.control_hz, name)
-        follows = np.diff([step.index for step in chosen]) == 1
-        periods_s += np.diff(times_s)[follows & are_known].tolist()
-        layout = Layout.from_json(header.state_layout) if header.state_layout else None
-        part = Dataset(
-            pictures=np.stack(pictures) if pictures else None,
-            states=np.array([step.state for step in chosen], np.float32) if layout else None,
-            actions=np.array([step.action for step in chosen], np.float32),
-            episodes=(len(chosen),),
-            times_s=times_s,
-            files=tuple(f"{name}, step {step.index}" for step in chosen),
-            action_layout=Layout.from_json(header.action_layout),
-            state_layout=layout,
-            control_hz=header.control_hz,
-            body=header.body,
-        )
-        parts.append(part)
     if not parts:
         raise DemosError(f"There is no step of {' or '.join(sorted(drivers))} in {data}.")
     return replace(merged(parts), rate_jitter=rate_jitter(periods_s, parts[0].control_hz))
@@ -192,18 +169,17 @@ def _episodes(data: Path) -> Iterator[tuple[str, EpisodeHeader, Iterator[_StepAn
         yield f"{data}, episode {number}", found.header, steps
 
 
-def _chosen(
+def _part(
     name: str,
     header: EpisodeHeader,
     steps: Iterator[_StepAndImage],
     drivers: Collection[str],
     shrink: Shrink | None,
-) -> tuple[list[Step], list[NDArray[np.uint8]]]:
-    """Return the steps of some drivers, each with its image if there are any."""
+) -> tuple[Dataset | None, list[float]]:
+    """Return the steps of some drivers, None without any, and the known times between them, s."""
     chosen: list[Step] = []
     pictures: list[NDArray[np.uint8]] = []
     newest = decoded = None
-    pixels = np.empty((0, 0, 3), np.uint8)
     for step, jpeg in steps:
         newest = jpeg or newest
         if step.driver not in drivers:
@@ -211,32 +187,42 @@ def _chosen(
         chosen.append(step)
         if newest is None:
             continue
-        if newest is not decoded and newest != decoded:
-            decoded, where = newest, f"{name}/{step.frame or step.index}"
-            pixels = decode_picture(newest, where)
-            size = (pixels.shape[1], pixels.shape[0])
-            if header.image_size not in {None, size}:
-                raise DemosError(f"{where} has {size} pixels, but the header {header.image_size}.")
-            pixels = pixels if shrink is None else shrink(pixels, header)
-        pictures.append(pixels)
+        if newest == decoded:  # The frame is also of the step before.
+            pictures.append(pictures[-1])
+            continue
+        decoded, where = newest, f"{name}/{step.frame or step.index}"
+        pixels = decode_picture(newest, where)
+        size = (pixels.shape[1], pixels.shape[0])
+        if header.image_size not in {None, size}:
+            raise DemosError(f"{where} has {size} pixels, but the header {header.image_size}.")
+        pictures.append(pixels if shrink is None else shrink(pixels, header))
+    if not chosen:
+        return None, []
     if len(pictures) not in {0, len(chosen)}:
         raise DemosError(f"Only some steps of {name} have images.")
-    return chosen, pictures
-
-
-def _times_s(steps: Sequence[Step], hz: float, name: str) -> tuple[NDArray[np.float64], bool]:
-    """Return the time of each step, s, and whether all times were recorded.
-
-    If not, times are computed from the rate.
-    """
-    indices = np.array([step.index for step in steps])
-    known = [step.captured_ns for step in steps if step.captured_ns is not None]
-    if len(known) < len(steps):
-        return (indices - indices[0]) / hz, False
-    times_s = (np.array(known, np.int64) - known[0]) / 1e9
-    if (np.diff(times_s) < 0.0).any():
-        raise DemosError(
-            f"Time runs backwards in {name} after step {indices[np.diff(times_s).argmin()]}: "
-            "exclude steps with `shapechanger demos bad`."
-        )
-    return times_s, True
+    indices = np.array([step.index for step in chosen])
+    times_s, periods_s = (indices - indices[0]) / header.control_hz, list[float]()
+    known = [step.captured_ns for step in chosen if step.captured_ns is not None]
+    if len(known) == len(chosen):  # Otherwise the times are computed from the rate.
+        times_s = (np.array(known, np.int64) - known[0]) / 1e9
+        apart = np.diff(times_s)
+        if (apart < 0.0).any():
+            raise DemosError(
+                f"Time runs backwards in {name} after step {indices[apart.argmin()]}: exclude "
+                "steps with `shapechanger demos bad`."
+            )
+        periods_s = apart[np.diff(indices) == 1].tolist()
+    layout = Layout.from_json(header.state_layout) if header.state_layout else None
+    part = Dataset(
+        pictures=np.stack(pictures) if pictures else None,
+        states=np.array([step.state for step in chosen], np.float32) if layout else None,
+        actions=np.array([step.action for step in chosen], np.float32),
+        episodes=(len(chosen),),
+        times_s=times_s,
+        files=tuple(f"{name}, step {step.index}" for step in chosen),
+        action_layout=Layout.from_json(header.action_layout),
+        state_layout=layout,
+        control_hz=header.control_hz,
+        body=header.body,
+    )
+    return part, periods_s

@@ -10,13 +10,13 @@ from pathlib import Path
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.demos.episodes.records import free_path, is_episode
 from shapechanger.errors import DemosError, OutputError
+from shapechanger.files import writing
 
 
 def merge(sources: Sequence[Path], out: Path) -> list[tuple[Path, Path]]:
     """Copy episodes into one recording; the sources are not changed, and nothing is overwritten.
 
-    All episodes are read before the first one is copied. An episode whose name is taken gets the
-    next free number.
+    All episodes are read before the first one is copied. A taken name gets the next free number.
 
     Args:
         sources: Recordings, or single episodes.
@@ -41,10 +41,7 @@ def merge(sources: Sequence[Path], out: Path) -> list[tuple[Path, Path]]:
     known = {_identity(episode): episode.path for episode in there}
     for episode in episodes:
         if not episode.closed:
-            raise DemosError(
-                f"{episode.path} is not closed: wait until its recording ends, or run "
-                f"`shapechanger demos repair {episode.path}` if the recorder has crashed."
-            )
+            raise DemosError(f"{episode.path} is still recorded, or needs `demos repair`.")
         if same := known.get(_identity(episode)):
             raise DemosError(f"{episode.path} and {same} are the same episode.")
         known[_identity(episode)] = episode.path
@@ -63,15 +60,13 @@ def _identity(episode: Episode) -> tuple[object, ...]:
 
 def _copied(source: Path, out: Path) -> Path:
     """Copy an episode atomically."""
-    part = out / f".{source.name}.{os.getpid()}.part"
-    target = free_path(out, source.name)
+    part, target = out / f".{source.name}.{os.getpid()}.part", free_path(out, source.name)
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(source, part)
-        part.rename(target)
-    except OSError as error:
+        with writing(target):
+            out.mkdir(parents=True, exist_ok=True)
+            shutil.copytree(source, part)
+            part.rename(target)
+    except OutputError:
         shutil.rmtree(part, ignore_errors=True)
-        # `shutil.Error` lists many errors, and has no text of its own.
-        reason = error.strerror or "not all of its files could be copied"
-        raise OutputError(f"Cannot copy {source} to {out}: {reason}.") from error
+        raise
     return target

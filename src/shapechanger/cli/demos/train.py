@@ -144,11 +144,12 @@ class DemosTrain(_Waypoints):
         if not evaluated.any():
             evaluated = learned
             note = "These are the steps that it learned from, so expect less on others."
-        evaluation = evaluate(policy, data, evaluated)
+        shown = data.part(evaluated)
+        evaluation = evaluate(policy, shown)
         policy.save(self.out)
         self._write_for_sb3(policy, shrinking.size)
         page = self.out.with_suffix(".html")
-        numbers = write_report(page, self.out.name, policy, data, evaluation, training, note)
+        numbers = write_report(page, self.out.name, policy, shown, evaluation, training, note)
         say(f"wrote {self.out}, {page} and {numbers}")
         say(note)
         if ahead := outlook(policy.card):
@@ -225,7 +226,7 @@ class DemosEvaluate(_Waypoints):
         if policy.card.data.get("digest") == shrinking.digest(data.actions):
             note = f"The policy learned from the first {learned} of these {len(data)} steps."
             if learned < len(data):
-                unseen = evaluate(policy, data, np.arange(len(data)) >= learned)
+                unseen = evaluate(policy, data.part(np.arange(len(data)) >= learned))
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
             say(note)
         if self.report is not None:

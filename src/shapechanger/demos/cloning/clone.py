@@ -157,17 +157,15 @@ DEMOS: Final = CloneSettings(
 )
 """Settings for few demonstrations."""
 
-# Number of steps from which one network on colours and finer images is used: two and a half minutes
-# at 20 Hz. With fewer steps, it would learn irrelevant details.
+# Number of steps from which one network on colours and finer images is used: 2.5 minutes at 20 Hz.
 _MANY: Final = 3000
 
 
 def settings_for(steps: int) -> CloneSettings:
     """Return the settings for this many steps.
 
-    With many steps, no steps are held out, and the last network is kept. When a tenth of twenty
-    minutes was held out, the network after 140 of 1,400 steps was best by 0.3 %, and drove badly;
-    see docs/cloning.md.
+    With many steps, no steps are held out, and the last network is kept: early stopping can choose
+    a network that drives badly, see docs/cloning.md.
     """
     return DEMOS if steps < _MANY else CloneSettings(held_out=0.0)
 
@@ -227,8 +225,7 @@ class ShrunkFrames:
 
     Attributes:
         framing: Crop and resolution.
-        view: Returns the frame of another camera for a frame and the header of its episode; None
-            for the same camera.
+        view: Returns a frame of another camera for one of an episode; None for the same camera.
         size: Rows and columns of the last frame before it was reduced; None before the first frame.
         seen: Digests of the frames.
     """
@@ -337,11 +334,6 @@ def prepared(
 ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32] | None]:
     """Return the inputs for the network of a clone; None for an input that it does not have.
 
-    Args:
-        card: Its card.
-        pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared.
-        states: Shape (n, k), NaN for unknown values.
-
     Raises:
         DemosError: If an input is missing or has another shape.
     """
@@ -354,9 +346,9 @@ def prepared(
     if layout is None:
         return seen, None
     if states is None or states.ndim != 2 or states.shape[1] != layout.size:
+        names, got = ", ".join(layout.names), "none" if states is None else states.shape
         raise DemosError(
-            f"This policy needs the state {', '.join(layout.names)} with shape "
-            f"(n, {layout.size}), got {'none' if states is None else states.shape}."
+            f"This policy needs the state {names} with shape (n, {layout.size}), got {got}."
         )
     known = np.array(states, np.float32)
     for name in net.unseen:
@@ -367,22 +359,16 @@ def prepared(
 def targets(net: CloneNetwork, actions: NDArray[np.float32]) -> NDArray[Any]:
     """Return the target outputs of a network for actions of shape (n, m).
 
-    Returns:
-        Class indices, shape (n,), -1 for an unknown action; or actions scaled to [-1, 1], shape
-        (n, m).
-
-    Raises:
-        DemosError: If an action is outside [-1, 1], and the network states no other range.
+    They are class indices, shape (n,), -1 for an unknown action, or actions scaled to [-1, 1],
+    shape (n, m). An action outside [-1, 1] is refused if the network states no other range.
     """
     if net.classes:
         return class_numbers(actions, net.classes)
     if not net.low:
-        if (wrong := ~(np.abs(actions) <= 1.0 + _ROUNDING).all(axis=1)).any():
-            first = int(wrong.argmax())
-            raise DemosError(
-                f"Steering and throttle must be in [-1, 1], but action {first} is "
-                f"{actions[first].tolist()}."
-            )
+        wrong = np.flatnonzero(~(np.abs(actions) <= 1.0 + _ROUNDING).all(axis=1))
+        if len(wrong):
+            found = f"action {wrong[0]} is {actions[wrong[0]].tolist()}"
+            raise DemosError(f"Steering and throttle must be in [-1, 1], but {found}.")
         return actions.astype(np.float32)
     low, high = np.asarray(net.low, np.float32), np.asarray(net.high, np.float32)
     return (2.0 * (actions - low) / (high - low) - 1.0).astype(np.float32).clip(-1.0, 1.0)
@@ -391,11 +377,6 @@ def targets(net: CloneNetwork, actions: NDArray[np.float32]) -> NDArray[Any]:
 def class_numbers(
     actions: NDArray[np.floating], classes: tuple[tuple[float, ...], ...]
 ) -> NDArray[np.int64]:
-    """Return the class index of each action, shape (n,); -1 for an unknown action.
-
-    Args:
-        actions: Shape (n, m).
-        classes: The actions of the classes.
-    """
+    """Return the class index of each action of shape (n, m); -1 for an unknown action."""
     apart = np.abs(actions[:, None, :] - np.asarray(classes, np.float32)).max(axis=2)
     return np.where(apart.min(axis=1) < _ROUNDING, apart.argmin(axis=1), -1).astype(np.int64)

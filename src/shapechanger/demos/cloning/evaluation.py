@@ -181,29 +181,19 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
     target: tuple[tuple[float, ...], ...]
 
 
-def evaluate(
-    policy: Clone, data: Dataset, which: NDArray[np.bool_] | None = None
-) -> EvaluationResult:
+def evaluate(policy: Clone, data: Dataset) -> EvaluationResult:
     """Compare a policy with the driver of demonstrations.
-
-    Args:
-        policy: The policy.
-        data: The demonstrations.
-        which: Mask of the steps to use, shape (n,); None for all.
 
     Raises:
         PolicyError: If the layouts differ.
         DemosError: If there is no step, or the data lack an input of the policy.
     """
     policy.card.require_layouts(data.action_layout, data.state_layout)
-    chosen = np.flatnonzero(np.ones(len(data), np.bool_) if which is None else which)
-    if not len(chosen):
+    if not len(data):
         raise DemosError("There is no step to evaluate the policy on.")
-    pictures = None if data.pictures is None else data.pictures[chosen]
-    states = None if data.states is None else data.states[chosen]
-    target = data.actions[chosen].astype(np.float64)
-    out = policy.outputs(pictures, states)
-    predicted = policy.predict_many(pictures, states).astype(np.float64)
+    target = data.actions.astype(np.float64)
+    out = policy.outputs(data.pictures, data.states)
+    predicted = policy.predict_many(data.pictures, data.states).astype(np.float64)
     layout, classes = data.action_layout, policy.net.classes
     apart = np.abs(predicted - target)
     # Ranges of the driver alone: an absurd output would widen them, so that all others seem right.
@@ -246,7 +236,7 @@ def evaluate(
         errors=tuple(apart.mean(axis=0).tolist()),
         within=float((relative <= _TOLERANCE).all(axis=1).mean()),
         tolerance=_TOLERANCE,
-        worst=tuple(chosen[np.argsort(-wrongness, kind="stable")[:_WORST]].tolist()),
+        worst=tuple(np.argsort(-wrongness, kind="stable")[:_WORST].tolist()),
         predicted=tuple(map(tuple, predicted[shown].tolist())),
         target=tuple(map(tuple, target[shown].tolist())),
     )

@@ -31,7 +31,7 @@ try:
         mirror_of,
         stretch,
     )
-    from shapechanger.demos.cloning.network import CameraPolicy, joined, seeded
+    from shapechanger.demos.cloning.network import CameraNetwork, CameraPolicy, joined, seeded
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
@@ -140,44 +140,50 @@ def learn(
     if not len(data):
         raise DemosError("There is no step to learn from.")
     settings = settings_for(len(data)) if settings is None else settings
-    if start is None:
-        sees, feels = _inputs_of(data, inputs)
-    else:
+    if start is not None:
         start.card.require_layouts(data.action_layout, data.state_layout)
-        sees, feels = start.net.eyes != "none", bool(start.net.nerves)
+        feels = bool(start.net.nerves)
+    else:
+        if inputs == "auto":
+            inputs = "state" if data.pictures is None else "picture"
+        feels = inputs != "picture"
+        if inputs != "state" and data.pictures is None:
+            raise DemosError("These demonstrations have no images to learn from.")
+        if feels and (data.states is None or not data.states.shape[1]):
+            raise DemosError("These demonstrations have no state to learn from.")
     mirrors, share, note = _mirrors(data, feels, settings.augmentation.mirror if symmetric else -1)
     augmentation = msgspec.structs.replace(settings.augmentation, mirror=share)
     settings = msgspec.structs.replace(settings, augmentation=augmentation)
-    card = _card(data, settings, head, sees, feels, mirrors[0]) if start is None else start.card
+    card = _card(data, settings, head, inputs, mirrors[0]) if start is None else start.card
     shown = Examples.of(data, card, mirrors)
     again = None if rehearsal is None else Examples.of(rehearsal, card, mirrors)
     members = settings.members if start is None else 1
-    policies: list[CameraPolicy] = []
+    networks: list[CameraNetwork] = []
     checks: list[MemberCheck] = []
     steps: list[int] = []
     validated: list[tuple[Tensor, Tensor]] = []
+
+    def report(check: MemberCheck) -> None:
+        checks.append(check)
+        on_check(check)
+
     for member in range(members):
         own_seed = seed * members + member
-        policy = CameraPolicy.blank(card, own_seed) if start is None else start.copy()
         kept_back = stretch(len(data), member, members, settings.held_out)
-
-        def report(step: int, loss: float, error: float, member: int = member) -> None:
-            checks.append(MemberCheck(member, step, loss, error))
-            on_check(checks[-1])
-
+        with seeded(own_seed):
+            network = CameraNetwork(card) if start is None else copy.deepcopy(start.network)
+        drawn = batches(shown, ~kept_back, again, settings, own_seed)
+        if not card.network.seeds:
+            _begin(network, shown.plain(~kept_back))
+        validation = shown.plain(kept_back)
+        total = settings.steps(int((~kept_back).sum()))
         with seeded(own_seed):  # Dropout draws from the global generator.
-            drawn = batches(shown, ~kept_back, again, settings, own_seed)
-            if not card.network.seeds:
-                _begin(policy, shown.plain(~kept_back))
-            validation = shown.plain(kept_back)
-            steps.append(_fit(policy, drawn, validation, int((~kept_back).sum()), settings, report))
-        policies.append(policy)
-        validated.append(_validated(policy, validation))
-    net = msgspec.structs.replace(card.network, seeds=(*card.network.seeds, seed))
-    if members > 1:
-        net = msgspec.structs.replace(net, members=members)
+            steps.append(_fit(network, drawn, validation, total, settings, member, report))
+        networks.append(network)
+        validated.append(_validated(network, validation))
+    several = {"members": members} if members > 1 else {}
+    net = msgspec.structs.replace(card.network, seeds=(*card.network.seeds, seed), **several)
     card = msgspec.structs.replace(card, clone=net, seed=seed, steps=len(data), settings=settings)
-    networks = [policy.network for policy in policies]
     whole = networks[0] if members == 1 else joined(card, networks)
     if net.classes:
         # Scale the logits so that confidence matches accuracy on held-out steps.
@@ -187,18 +193,6 @@ def learn(
             whole.hands.bias.div_(temperature)
     training = Training(tuple(checks), tuple(steps), note, time.monotonic() - began)
     return CameraPolicy(whole, card), training
-
-
-def _inputs_of(data: Dataset, inputs: Inputs) -> tuple[bool, bool]:
-    """Return whether the policy uses images, and whether it uses states."""
-    if inputs == "auto":
-        inputs = "picture" if data.pictures is not None else "state"
-    sees, feels = inputs in {"picture", "both"}, inputs in {"state", "both"}
-    if sees and data.pictures is None:
-        raise DemosError("These demonstrations have no images to learn from.")
-    if feels and (data.states is None or not data.states.shape[1]):
-        raise DemosError("These demonstrations have no state to learn from.")
-    return sees, feels
 
 
 def _mirrors(
@@ -227,15 +221,11 @@ def _mirrors(
 
 
 def _card(
-    data: Dataset,
-    settings: CloneSettings,
-    head: AskedHead,
-    sees: bool,
-    feels: bool,
-    mirror: Mirror | None,
+    data: Dataset, settings: CloneSettings, head: AskedHead, inputs: Inputs, mirror: Mirror | None
 ) -> PolicyCard:
     """Return the card of a new policy for demonstrations."""
-    names = data.state_layout.names if feels and data.state_layout is not None else ()
+    state = None if inputs == "picture" else data.state_layout
+    names = () if state is None else state.names
     unseen = tuple(name for name in names if name.endswith(_APPLIED))
     if names and len(unseen) == len(names):
         raise DemosError(
@@ -245,19 +235,19 @@ def _card(
         framing=settings.framing,
         channels=settings.channels,
         features=settings.features,
-        eyes=settings.eyes if sees else "none",
-        nerves=settings.nerves if feels else (),
+        eyes="none" if inputs == "state" else settings.eyes,
+        nerves=settings.nerves if names else (),
         unseen=unseen,
         **output_fields(data.actions, data.action_layout, head, mirror and mirror(data.actions)),
     )
-    state = data.state_layout if feels else None
     return PolicyCard(learner="cloning", observation=state, action=data.action_layout, clone=net)
 
 
-def _validated(policy: CameraPolicy, shown: Plain) -> tuple[Tensor, Tensor]:
+@torch.no_grad()
+def _validated(network: CameraNetwork, shown: Plain) -> tuple[Tensor, Tensor]:
     """Return the outputs of the last layer for examples, and their targets."""
     pictures, states, targets = shown
-    return policy.logits(pictures, states), torch.as_tensor(targets)
+    return network.eval().hands(network.features(pictures, states)), torch.as_tensor(targets)
 
 
 def _loss(out: Tensor, target: Tensor, smoothing: float = 0.0) -> Tensor:
@@ -267,68 +257,64 @@ def _loss(out: Tensor, target: Tensor, smoothing: float = 0.0) -> Tensor:
     return functional.smooth_l1_loss(torch.tanh(out), target, beta=_HUBER_BETA)
 
 
-def _begin(policy: CameraPolicy, shown: Plain) -> None:
+@torch.no_grad()
+def _begin(network: CameraNetwork, shown: Plain) -> None:
     """Initialise the output to the mean action or the frequencies, and normalise the states."""
-    network, (_, states, targets) = policy.network, shown
-    with torch.no_grad():
-        if policy.net.classes:
-            counts = np.bincount(targets, minlength=len(policy.net.classes)) + 1.0
-            network.hands.weight.zero_()
-            network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
-        else:
-            mean = torch.as_tensor(targets.mean(axis=0))
-            network.hands.bias.copy_(torch.atanh(mean.clamp(-_MAX_INITIAL, _MAX_INITIAL)))
-        if states is not None:
-            known = np.where(np.isfinite(states), states, np.nan)
-            measured = np.isfinite(known).any(axis=0)
-            middle, spread = (f(known[:, measured], axis=0) for f in (np.nanmean, np.nanstd))
-            spread = np.where(spread > _MIN_SPREAD, spread, 1.0)
-            for name, values in (("middle", middle), ("spread", spread)):
-                getattr(network.nerves, name)[measured] = torch.as_tensor(values)
+    _, states, targets = shown
+    if classes := network.card.network.classes:
+        counts = np.bincount(targets, minlength=len(classes)) + 1.0
+        network.hands.weight.zero_()
+        network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
+    else:
+        mean = torch.as_tensor(targets.mean(axis=0))
+        network.hands.bias.copy_(torch.atanh(mean.clamp(-_MAX_INITIAL, _MAX_INITIAL)))
+    if states is not None:
+        known = np.where(np.isfinite(states), states, np.nan)
+        measured = np.isfinite(known).any(axis=0)
+        middle, spread = (f(known[:, measured], axis=0) for f in (np.nanmean, np.nanstd))
+        spread = np.where(spread > _MIN_SPREAD, spread, 1.0)
+        for name, values in (("middle", middle), ("spread", spread)):
+            getattr(network.nerves, name)[measured] = torch.as_tensor(values)
 
 
 def _fit(
-    policy: CameraPolicy,
+    network: CameraNetwork,
     drawn: Iterator[Batch],
     validation: Plain,
-    learned: int,
+    total: int,
     settings: CloneSettings,
-    report: Callable[[int, float, float], None],
+    member: int,
+    report: Callable[[MemberCheck], None],
 ) -> int:
-    """Train the network of a policy in place to its best weights, and return their step."""
-    network = policy.network
-    rate = settings.further_rate if policy.net.seeds else settings.learning_rate
+    """Train a network in place to its best weights in `total` steps, and return their step."""
+    rate = settings.further_rate if network.card.network.seeds else settings.learning_rate
     optimizer = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=settings.weight_decay)
-    total = settings.steps(learned)
     every = max(total // settings.checks, 1)
     # The network to validate and keep: the trained one, or a copy with averaged weights.
-    kept = CameraPolicy(copy.deepcopy(network) if settings.averaging else network, policy.card)
+    kept = copy.deepcopy(network) if settings.averaging else network
     losses: list[float] = []
     best_step, least, worse = -1, math.nan, 0
     best_weights = dict[str, Tensor]()
     for step in range(total + 1):
         if step % every == 0 or step == total:
-            kept.network.eval()
             error = math.nan
             if len(validation[2]):
                 error = float(_loss(*_validated(kept, validation)))
-            report(step, sum(losses) / len(losses) if losses else math.nan, error)
+            loss = sum(losses) / len(losses) if losses else math.nan
+            report(MemberCheck(member, step, loss, error))
             losses.clear()
             worse += 1
             # NaN without held-out data: keep the last.
             if best_step < 0 or not error >= least:
                 best_step, least, worse = step, error, 0
-                best_weights = {n: w.clone() for n, w in kept.network.state_dict().items()}
+                best_weights = {n: w.clone() for n, w in kept.state_dict().items()}
             if step == total or worse >= settings.patience:
                 break
         for group in optimizer.param_groups:
             group["lr"] = rate * _share_of_rate(step, total, settings.warm_up)
-        network.train()
         pictures, states, targets = next(drawn)
-        found = network.perceive(pictures, states)
-        loss = _loss(
-            network.hands(functional.dropout(found, settings.dropout)), targets, settings.smoothing
-        )
+        found = functional.dropout(network.train().perceive(pictures, states), settings.dropout)
+        loss = _loss(network.hands(found), targets, settings.smoothing)
         optimizer.zero_grad()
         loss.backward()  # pyright: ignore[reportUnknownMemberType]
         torch.nn.utils.clip_grad_norm_(network.parameters(), _MAX_GRADIENT)
@@ -336,12 +322,11 @@ def _fit(
         losses.append(loss.item())
         if settings.averaging:
             share = min(settings.averaging, (step + 1) / (step + 1 + _AVERAGE_FROM))
-            pairs = zip(kept.network.parameters(), network.parameters(), strict=True)
+            pairs = zip(kept.parameters(), network.parameters(), strict=True)
             with torch.no_grad():
                 for old, new in pairs:
                     old.lerp_(new, 1.0 - share)
     network.load_state_dict(best_weights)
-    network.eval()
     return best_step
 
 

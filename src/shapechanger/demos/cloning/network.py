@@ -5,7 +5,6 @@ The attributes `eyes`, `nerves` and `hands` name the weights in the file of a po
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -244,18 +243,9 @@ class CameraPolicy(Clone):
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
         """Return the outputs of the network, as `Clone` describes them."""
-        return self.network.activation(self.logits(pictures, states)).numpy()
-
-    def logits(
-        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
-    ) -> Tensor:
-        """Return the outputs of the last layer, from which `outputs` are computed."""
-        with torch.inference_mode():
-            return self.network.hands(self.network.features(pictures, states))
-
-    def copy(self) -> CameraPolicy:
-        """Return a policy that shares no weights with this one."""
-        return CameraPolicy(copy.deepcopy(self.network), self.card)
+        with torch.no_grad():
+            features = self.network.features(pictures, states)
+            return self.network.activation(self.network.hands(features)).numpy()
 
     def export(self, path: Path) -> None:
         """Write the policy as ONNX, which a robot runs without PyTorch.
