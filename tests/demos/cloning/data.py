@@ -1,4 +1,4 @@
-"""Small demonstrations: of stripes, or of a rendered corridor."""
+"""Small demonstrations: of stripes, or of a door in a corridor."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.clone import DEMOS, Augmentation, CloneSettings
 from shapechanger.demos.cloning.network import CameraPolicy
@@ -100,64 +99,26 @@ SMALL: Final = CloneSettings(
 )
 """Settings that learn the corridor in seconds."""
 
-# A camera a few centimetres above the floor with a field of view of 90 degrees across.
-_EYE = 0.1
-_WIDTH, _HEIGHT = 2.0, 2.5
-_SLOW_BELOW = 4.0  # m to the wall at the end.
-
 
 def corridor(n: int, seed: int, gain: float = 1.0) -> Dataset:
-    """Return images of n poses in n corridors, with the actions of a driver.
+    """Return images of a door ahead in any light, with the actions of a driver towards it.
 
     Args:
         n: Number of images.
-        seed: Seed of poses, colours and noise.
+        seed: Seed of places, light and noise.
         gain: Steering gain; another vehicle needs more, or less.
     """
     rng = np.random.default_rng(seed)
-    aside = rng.uniform(-0.7, 0.7, n)  # m to the left of the middle.
-    turned = rng.uniform(-0.5, 0.5, n)  # rad to the left of the corridor.
-    ahead = rng.uniform(1.5, 12.0, n)  # m to the end.
-    pictures = np.empty((n, *SIZE, 3), np.uint8)
-    for i in range(n):
-        picture = _look(aside[i], turned[i], ahead[i], rng)
-        seen = rng.uniform(0.3, 0.6) * picture + rng.normal(0.0, 4.0, picture.shape)
-        pictures[i] = np.clip(seen, 0, 255)
-    # Right of the middle and looking right needs left, which is negative.
-    steering = np.clip(gain * (1.2 * turned + 0.8 * aside), -1.0, 1.0)
-    throttle = np.where(ahead < _SLOW_BELOW, 0.2, 0.8) - 0.3 * np.abs(steering)
-    actions = np.stack((steering, throttle), axis=1).astype(np.float32)
-    return Dataset(pictures, None, actions, (n,), np.arange(n) / 20.0, (), STEERS, None, 20.0)
+    place = rng.uniform(-1.0, 1.0, n)
+    door = np.abs(np.linspace(-1.0, 1.0, SIZE[1]) - place[:, None]) < 0.2
+    light = rng.uniform(0.5, 1.0, (n, 1)) * np.where(door, 200.0, 60.0)
+    pictures = light[:, None, :, None] + rng.normal(0.0, 4.0, (n, *SIZE, 3))
+    steering = np.clip(gain * place, -1.0, 1.0)
+    actions = np.stack((steering, 0.8 - 0.6 * np.abs(steering)), axis=1).astype(np.float32)
+    seen = pictures.clip(0, 255).astype(np.uint8)
+    return Dataset(seen, None, actions, (n,), np.arange(n) / 20.0, (), STEERS, None, 20.0)
 
 
 def error(policy: CameraPolicy, test: Dataset) -> float:
     """Return the mean absolute error of the actions on test images."""
     return float(np.abs(policy.predict_many(test.pictures) - test.actions).mean())
-
-
-def _look(
-    aside: float, turned: float, ahead: float, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """Render one image of a straight corridor by casting rays, at full light."""
-    height, width = SIZE
-    left = 1.0 - 2.0 * (np.arange(width) + 0.5) / width
-    up = (1.0 - 2.0 * (np.arange(height) + 0.5) / height) * height / width + 0.1
-    x = np.cos(turned) - left * np.sin(turned)
-    y = np.sin(turned) + left * np.cos(turned)
-    # Rays parallel to a plane meet it far away.
-    to_end = np.where(x > 1e-6, ahead / np.maximum(x, 1e-6), 1e6)
-    to_side = (np.sign(y) * _WIDTH / 2.0 - aside) / np.where(np.abs(y) < 1e-6, 1e-6, y)
-    to_wall = np.minimum(to_end, np.abs(to_side))
-    far = np.where(up > 0.0, _HEIGHT - _EYE, _EYE) / np.maximum(np.abs(up), 1e-6)
-    along = x * to_wall
-    flat = far[:, None] < to_wall[None, :]
-    high = _EYE + up[:, None] * to_wall[None, :]
-
-    wall, floor, door = (rng.uniform(80, 255, 3) for _ in range(3))
-    pitch, phase = rng.uniform(2.0, 5.0), rng.uniform(0.0, 5.0)
-    is_door = (np.mod(along + phase, pitch) < 0.9) & (to_wall < to_end)
-    upright = np.where(is_door[None, :, None] & (high < 2.0)[:, :, None], door, wall)
-    upright = np.where((high < 0.1)[:, :, None], 0.4 * wall, upright)  # The skirting board.
-    shade = np.where(to_wall < to_end, 1.0, 0.6)
-    ground = np.where(up > 0.0, 1.1, 0.7)[:, None, None] * floor
-    return np.where(flat[:, :, None], ground, upright * shade[None, :, None])

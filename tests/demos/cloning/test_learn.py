@@ -59,14 +59,6 @@ def test_it_learns_which_key_is_held(keys: Cloned) -> None:
     assert policy.card.settings.augmentation.mirror > 0.3  # The data go to both sides.
 
 
-def test_actions_follow_the_layout(keys: Cloned) -> None:
-    done = keys[0].predict_many(stripes(30, 2).pictures)
-    assert done.shape == (30, 4)
-    assert set(map(tuple, done.tolist())) <= set(keys[0].net.classes)
-    probabilities = keys[0].outputs(stripes(30, 2).pictures)
-    np.testing.assert_allclose(probabilities.sum(axis=1), 1.0, atol=1e-5)
-
-
 @pytest.mark.parametrize("inputs", ["picture", "state", "both"])
 def test_regression_from_any_input(inputs: Inputs) -> None:
     policy, _ = learn(stripes(200, 0, STEERS), settings=QUICK, inputs=inputs, seed=0)
@@ -160,7 +152,7 @@ def test_the_training_log_matches_the_policy(driver: Cloned) -> None:
 
 def test_a_start_policy_helps_with_few_images(driver: Cloned) -> None:
     few, test = corridor(30, 3, gain=0.5), corridor(200, 4, gain=0.5)
-    settings = msgspec.structs.replace(SMALL, fewest_steps=80, most_steps=80)
+    settings = msgspec.structs.replace(SMALL, fewest_steps=40, most_steps=40)
     scratch, further = (_cloned(few, settings, start)[0] for start in (None, driver[0]))
     assert error(further, test) < 0.8 * error(scratch, test)
     assert error(further, test) < 0.8 * error(driver[0], test)
@@ -209,21 +201,6 @@ def test_training_stops_early() -> None:
     assert checks[-1].step < 60
     assert training.best_steps == (checks[-1].step - 6,)
     assert repr(tuple(checks)) == repr(training.checks)  # NaN is not equal to itself.
-
-
-def test_read_only_arrays_are_accepted() -> None:
-    few, old = corridor(12, 0), corridor(12, 1)
-    expected, _ = _cloned(few, _HASTY, rehearsal=old)
-    for data in (few, old):
-        assert data.pictures is not None
-        data.pictures.flags.writeable = data.actions.flags.writeable = False
-    policy, _ = _cloned(few, _HASTY, rehearsal=old)
-    np.testing.assert_array_equal(policy.outputs(few.pictures), expected.outputs(few.pictures))
-
-
-def test_the_number_of_steps_follows_the_images() -> None:
-    settings = CloneSettings(batch=10, passes=2.0, fewest_steps=50, most_steps=100)
-    assert [settings.steps(n) for n in (1, 400, 9000)] == [50, 80, 100]
 
 
 def test_invalid_data_are_refused() -> None:
