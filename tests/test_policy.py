@@ -51,16 +51,11 @@ def _metadata(**fields: object) -> Callable[[Header], object]:
 HEADERS: dict[str, Callable[[Header], object]] = {
     "overlapping arrays": _with(data_offsets=[16, 32]),
     "offsets beyond the file": _with(data_offsets=[0, 2**62]),
-    "a negative offset": _with(data_offsets=[-1, 15]),
     "a shape of 2^64 numbers": _with(shape=[2**62, 4]),
     "numbers of eight bytes": _with(dtype="F64"),
-    "another type of as many bytes": _with(dtype="I32"),
-    "an unknown type": _with(dtype="F3"),
     "a card without its hash": _metadata(card="not JSON"),
     "a wrong hash": _metadata(sha256="0" * 64),
-    "no hash": lambda header: header["__metadata__"].pop("sha256"),
     "no card": lambda header: header["__metadata__"].pop("card"),
-    "half a character": _metadata(card="\ud800"),
     "a card with a line and a colour": _metadata(card="a\nb\x1b[31m"),
     "metadata that are a list": lambda header: header.update(__metadata__=[1]),
     "no metadata": lambda header: header.pop("__metadata__"),
@@ -83,12 +78,9 @@ class _Trap:
 
 
 FILES: dict[str, Callable[[bytes], bytes]] = {
-    "nothing": lambda _: b"",
     "half a header": lambda content: content[:60],
-    "all but a byte": lambda content: content[:-1],
     "a byte more": lambda content: content + b"x",
     "a length beyond the file": lambda content: (2**40).to_bytes(8, "little") + content[8:],
-    "a length of 2^64": lambda content: b"\xff" * 8 + content[8:],
     "a header that is a list": lambda _: (2).to_bytes(8, "little") + b"[]",
     "a header nested deeply": lambda _: (10**5).to_bytes(8, "little") + b"[" * 10**5,
     "a pickle": lambda _: pickle.dumps({"hands.bias": _Trap()}),

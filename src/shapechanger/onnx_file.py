@@ -21,15 +21,10 @@ _OPSET: Final = 18
 def export_network(
     network: Any, inputs: Mapping[str, Any], card: PolicyCard, path: Path, **facts: str
 ) -> None:
-    """Write a network of PyTorch as ONNX.
+    """Write a network of PyTorch as ONNX, with the card of its policy, without its settings.
 
-    Args:
-        network: A module whose `forward(*given)` takes the inputs in their order.
-        inputs: An example of each input by name, a tensor of shape (2, ...); the first axis stands
-            for any number.
-        card: Card of the policy; its last shape names the output. It is written without settings.
-        path: The file.
-        **facts: Further metadata.
+    Its `forward` takes the inputs in their order, each given by an example of shape (2, ...), whose
+    first axis stands for any number. The card's last shape names the output; facts are metadata.
 
     Raises:
         MissingExtra: If onnx or onnxscript is not installed.

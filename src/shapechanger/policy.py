@@ -63,8 +63,7 @@ class Framing(msgspec.Struct, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if min(self.height, self.width) < 1 or not 0.0 <= self.top < 1.0:
             raise PolicyError(
-                f"Invalid framing of {self.width} x {self.height} pixels below a cut of "
-                f"{self.top}: sizes must be positive, and the cut in [0, 1)."
+                f"Invalid framing of images: sizes must be > 0, top in [0, 1): {self}."
             )
 
     @property
@@ -258,22 +257,13 @@ class Policy(ABC):
 
 
 class OnnxPolicy(Policy):
-    """A trained policy from an ONNX file, which runs without PyTorch.
-
-    Args:
-        card: Its provenance.
-        run: Its network, see `read_network`.
-    """
+    """A trained policy from an ONNX file, whose network, `run`, needs no PyTorch."""
 
     def __init__(self, card: PolicyCard, run: Network) -> None:
         self.card, self._run = card, run
 
     def act(self, observations: NDArray[Any]) -> NDArray[np.float32]:
-        """Return the mean actions, shape (n, actions), for observations of shape (n, observations).
-
-        Raises:
-            PolicyError: If the observations have another size.
-        """
+        """Return the mean actions, shape (n, actions), for observations, (n, observations)."""
         (size,) = self.card.shapes["observation"]
         if observations.ndim != 2 or observations.shape[1] != size:
             raise PolicyError(
@@ -343,12 +333,7 @@ def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes) -> bytes:
 
 
 def read_tensors(path: Path) -> tuple[PolicyCard, dict[str, NDArray[Any]]]:
-    """Read a file of safetensors: its card, and the arrays keyed by name.
-
-    Raises:
-        OSError, LookupError, ValueError, msgspec.MsgspecError: If it cannot be read, or has been
-            changed.
-    """
+    """Read a file of safetensors: its card, and the arrays keyed by name."""
     content = read_file(path, MAX_BYTES)
     length = int.from_bytes(content[:_LENGTH_BYTES], "little")
     try:
@@ -385,11 +370,7 @@ Network = Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float32]]
 
 
 def read_network(path: Path) -> tuple[PolicyCard, Network]:
-    """Read an ONNX file: its card, and its network, which runs on the CPU without PyTorch.
-
-    Raises:
-        Exception: If the file cannot be used; the errors of onnxruntime have no common base.
-    """
+    """Read an ONNX file: its card, and its network, which runs on the CPU without PyTorch."""
     content = read_file(path, MAX_BYTES)
     with translate_errors(ImportError, to=lambda _: MissingExtra("onnxruntime", "onboard")):
         runtime: Any = import_module("onnxruntime")

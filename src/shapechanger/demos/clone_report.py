@@ -37,19 +37,10 @@ def write_report(
     training: Training | None,
     data_note: str,
 ) -> Path:
-    """Write the report, and its numbers as JSON next to it.
+    """Write the report of a policy with this name, and its numbers as JSON next to it.
 
-    Args:
-        page: The file of the report.
-        name: Name of the policy.
-        policy: The policy.
-        data: The steps that it was evaluated on, which `evaluation.worst` indexes.
-        evaluation: Its evaluation.
-        training: How it was trained; None if unknown.
-        data_note: A sentence on the steps that it was evaluated on.
-
-    Returns:
-        The file of the numbers.
+    The data are the steps that it was evaluated on, which `evaluation.worst` indexes, and the note
+    is a sentence on them. The file of the numbers is returned.
 
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
@@ -119,9 +110,8 @@ _MINUTE_S: Final = 60.0
 def outlook(card: PolicyCard) -> str:
     """Return sentences on the collisions to expect of a cloned driver, and on the next step.
 
-    Returns:
-        "" if the policy does not steer by images, or its card has no `learned_s`. The rates were
-        measured with a car in corridors; no other clones were measured in this way.
+    They are "" if the policy does not steer by images, or its card has no `learned_s`: the rates
+    were measured with a car in corridors.
     """
     learned_s = card.data.get("learned_s", 0.0)
     names = () if card.action is None else card.action.names

@@ -28,15 +28,10 @@ def gaps_s(episode: Episode) -> list[float]:
 
 
 def rate_jitter(periods_s: Iterable[float], control_hz: float) -> float:
-    """Return how far the rate of a recording varied, as a share of the rate.
+    """Return how far the rate of a recording of so many steps per second varied, as a share of it.
 
-    Args:
-        periods_s: Times between consecutive steps, s.
-        control_hz: Steps per second, as recorded.
-
-    Returns:
-        The larger deviation of the 5th and the 95th percentile of the periods; at most 0.25, and 0
-        for fewer than 20 periods.
+    It is the larger deviation of the 5th and the 95th percentile of the times between steps, s; at
+    most 0.25, and 0 for fewer than 20 times.
     """
     periods = np.fromiter(periods_s, np.float64)
     if len(periods) < _MIN_PERIODS:
@@ -46,12 +41,6 @@ def rate_jitter(periods_s: Iterable[float], control_hz: float) -> float:
 
 
 def is_same_rate(recorded_hz: float, control_hz: float, jitter: float = 0.0) -> bool:
-    """Return whether a robot has the rate of a recording, within 1 % or the recording's jitter.
-
-    Args:
-        recorded_hz: Steps per second of the recording.
-        control_hz: Steps per second of the robot, or of another recording.
-        jitter: Result of `rate_jitter`.
-    """
+    """Return whether a robot has the rate of a recording, within 1 % or its `rate_jitter`."""
     allowed = max(_SAME_RATE, min(jitter, _MOST_JITTER))
     return abs(recorded_hz / control_hz - 1.0) <= allowed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.clone import class_numbers, targets
+from shapechanger.demos.cloning.clone import targets
 from shapechanger.demos.cloning.evaluation import (
     AskedHead,
     evaluate,
@@ -174,9 +173,3 @@ def test_unsuitable_classes_are_refused() -> None:
         output_fields(many, STEERS, "class")
     with pytest.raises(DemosError, match=r"All of 5 actions are equal \(left\)"):
         output_fields(_keys("LLLLL"), KEYS, "auto")
-
-
-def test_an_action_outside_the_classes() -> None:
-    classes = ((0.0, 1.0), (1.0, 0.0))
-    actions = np.array([[1.0 + 1e-6, 0.0], [0.5, 0.5], [math.nan, 0.0]])
-    assert class_numbers(actions, classes).tolist() == [1, -1, -1]

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from shapechanger.demos.cloning.clone import prepare
-from shapechanger.demos.cloning.network import DIRECTIONS, Eyes, edges
+from shapechanger.demos.cloning.network import DIRECTIONS, edges
 from shapechanger.errors import DemosError, PolicyError
-from shapechanger.policy import CloneNetwork, Framing
+from shapechanger.policy import Framing
 
 _FRAMING = Framing()
 
@@ -88,12 +88,3 @@ def test_neither_light_nor_colour_matters() -> None:
     yellow = torch.tensor([1.0, 0.9, 0.4]).view(1, 3, 1, 1)
     for other in (0.5 * _bars(True), yellow * _bars(True)):
         torch.testing.assert_close(edges(other, (4, 4)), before, atol=0.05, rtol=0.0)
-
-
-def test_images_of_any_size_have_features() -> None:
-    for height, width in ((48, 64), (30, 41), (3, 5)):
-        framing = Framing(height=height, width=width, top=0.0)
-        eyes = Eyes(CloneNetwork(framing=framing, channels=(8, 8), features=5, eyes="edges"))
-        found = eyes(torch.rand(2, 3, height, width))
-        assert found.shape == (2, 5)
-        assert bool((found >= 0.0).all())

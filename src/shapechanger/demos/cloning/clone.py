@@ -162,7 +162,7 @@ _MANY: Final = 3000
 
 
 def settings_for(steps: int) -> CloneSettings:
-    """Return the settings for this many steps.
+    """Return the settings for this many demonstrated steps.
 
     With many steps, no steps are held out, and the last network is kept: early stopping can choose
     a network that drives badly, see docs/cloning.md.
@@ -171,18 +171,10 @@ def settings_for(steps: int) -> CloneSettings:
 
 
 def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
-    """Crop and reduce images: each pixel is the mean of its area, rounded half up.
+    """Crop and reduce uint8 images, (n, H, W, 3), to the shape (n, height, width, 3) of a framing.
 
-    Args:
-        pictures: Red, green and blue, shape (n, H, W, 3); returned unchanged if they already have
-            the target size.
-        framing: Crop and resolution.
-
-    Returns:
-        Shape (n, height, width, 3).
-
-    Raises:
-        DemosError: If the images have another type or shape.
+    Each pixel is the mean of its area, rounded half up. Images that already have the target size
+    are returned unchanged, and those of another type or shape are refused.
     """
     shape = pictures.shape
     if len(shape) != 4 or shape[3] != 3 or 0 in shape[1:] or pictures.dtype != np.uint8:
@@ -249,11 +241,9 @@ class ShrunkFrames:
 
 
 class Clone(Policy):
-    """A cloned policy, for images, states or both.
+    """A cloned policy of images, states or both.
 
-    Args:
-        card: Its card.
-        run: Its network, which maps prepared images, `picture`, and states, `state`, to outputs.
+    Its network, `run`, maps prepared images, `picture`, and states, `state`, to outputs.
     """
 
     def __init__(self, card: PolicyCard, run: Network) -> None:
@@ -267,10 +257,7 @@ class Clone(Policy):
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m).
-
-        The arguments are the same as for `predict_many`.
-        """
+        """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m)."""
         given = zip(("picture", "state"), prepared(self.card, pictures, states), strict=True)
         return self._run({name: part for name, part in given if part is not None})
 

@@ -41,10 +41,8 @@ def tercile_classes(
 
     Each combination of thirds that occurs is a class. The extremes of the driver's actions replace
     missing bounds. An action with a value outside its range, by more than the tolerance, is in the
-    class `OUT_OF_RANGE`.
-
-    Returns:
-        The names of the classes, and the class index of each action, shape (n,).
+    class `OUT_OF_RANGE`. The names of the classes, and the class index of each action, shape (n,),
+    are returned.
     """
     low, high = _ranges(driver, layout)
     share = (actions - low) / np.where(high > low, high - low, 1.0)
@@ -79,14 +77,8 @@ def output_fields(
 ) -> dict[str, Any]:
     """Choose the output encoding from the demonstrated actions, as fields of a `CloneNetwork`.
 
-    Args:
-        actions: Actions of the driver, shape (n, m).
-        layout: Meaning of the values.
-        asked: Requested kind of output.
-        mirrored: The mirrored actions, if images are mirrored; None if not.
-
-    Raises:
-        DemosError: If there are too many different actions for classes, or all are equal.
+    Actions have shape (n, m), and so have the mirrored ones, if images are mirrored. Too many
+    different actions for classes, and actions that are all equal, are refused.
     """
     both = actions if mirrored is None else np.concatenate((actions, mirrored))
     different, counts = np.unique(both, axis=0, return_counts=True)
@@ -245,14 +237,11 @@ def evaluate(policy: Clone, data: Dataset) -> EvaluationResult:
 def macro_f1(
     predicted: NDArray[np.int64], truth: NDArray[np.int64], absurd: NDArray[np.bool_] | None = None
 ) -> float:
-    """Return the mean F1 score over every class that occurs in either array.
+    """Return the mean F1 score over every class that occurs in either array of shape (n,).
 
-    Args:
-        predicted: Chosen classes, shape (n,).
-        truth: Correct classes, shape (n,).
-        absurd: Mask of outputs outside all classes, shape (n,); None if each output is a class.
-            Each counts as a wrong choice of every class, and only classes of `truth` count:
-            otherwise the score would improve when a wrong choice becomes an absurd one.
+    With a mask of outputs outside all classes, `absurd`, each of them counts as a wrong choice of
+    every class, and only classes of `truth` count: otherwise the score would improve when a wrong
+    choice becomes an absurd one.
     """
     scores: list[float] = []
     for one in np.union1d(predicted, truth) if absurd is None else np.unique(truth):

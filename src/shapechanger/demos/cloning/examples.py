@@ -85,16 +85,10 @@ def mirror_of(layout: Layout) -> Mirror:
 
 
 def evaluated_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[np.bool_]:
-    """Return a mask of the steps to hold out to evaluate a policy on: the last ones.
+    """Return a mask of the steps to hold out to evaluate a policy on: the last share, in [0, 1).
 
-    Args:
-        episodes: Number of steps of each episode, in order.
-        by: "time" takes the last share of all steps; "episode" takes whole episodes from the end
-            until they have that share, but at least one, and leaves at least one.
-        share: Share of the steps, in [0, 1).
-
-    Raises:
-        DemosError: If the share is out of range, or there is one episode only.
+    "time" takes that share of all steps of episodes of these lengths; "episode" takes whole
+    episodes from the end until they have it, but at least one, and leaves at least one.
     """
     if not 0.0 <= share < 1.0:
         raise DemosError(f"The held-out share must be in [0, 1), got {share}.")
@@ -122,17 +116,11 @@ def stretch(n: int, member: int, members: int, share: float) -> NDArray[np.bool_
 def augmented(
     pictures: Tensor, index: Tensor, augmentation: Augmentation, generator: torch.Generator
 ) -> tuple[Tensor, Tensor]:
-    """Return images with random changes of light, colour, noise and position.
+    """Return images with random changes of light, colour, noise and position, and their mirroring.
 
-    Args:
-        pictures: uint8, shape (n, height, width, 3).
-        index: Indices of the images, shape (batch,), in random order.
-        augmentation: Kind and extent of the changes.
-        generator: Source of randomness.
-
-    Returns:
-        Images in [0, 1], shape (batch, 3, height, width), and a mask of the mirrored ones, whose
-        actions must be mirrored too, shape (batch,).
+    From uint8 images, shape (n, height, width, 3), those of an index in random order, shape
+    (batch,), become images in [0, 1], shape (batch, 3, height, width). The returned mask, shape
+    (batch,), is of the mirrored ones, whose actions must be mirrored too.
     """
     n = len(index)
 
@@ -204,15 +192,10 @@ class Examples(NamedTuple):
     def of(
         cls, data: Dataset, card: PolicyCard, mirrors: tuple[Mirror | None, Mirror | None]
     ) -> Examples:
-        """Return demonstrations as a policy sees and learns them.
+        """Return demonstrations as the policy of a card sees and learns them.
 
-        Args:
-            data: The demonstrations.
-            card: Card of the policy.
-            mirrors: Mirrors of actions and states; None to repeat the examples themselves.
-
-        Raises:
-            DemosError: If the demonstrations lack an input, or an action is out of range.
+        `mirrors` are of actions and states; None repeats the examples themselves. Demonstrations
+        that lack an input, or have an action out of range, are refused.
         """
         pictures, states = prepared(card, data.pictures, data.states)
         if pictures is not None:  # PyTorch does not accept read-only arrays.
@@ -249,7 +232,7 @@ def batches(
 ) -> Iterator[Batch]:
     """Yield batches indefinitely, from the examples in a mask, shape (n,), and from a rehearsal.
 
-    Images are augmented, and each example is drawn once before any repeats.
+    Each example is drawn once before any repeats.
     """
     generator = torch.Generator().manual_seed(seed)
     again = 0 if rehearsal is None else round(settings.rehearsal * settings.batch)

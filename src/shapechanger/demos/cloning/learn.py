@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 Inputs = Literal["auto", "picture", "state", "both"]
 """Inputs of a policy; "auto" takes images if there are any, and states otherwise."""
 
-# Error at which the loss changes from quadratic to linear. An error of a tenth of the steering's
-# range is a mistake, and one mistake of the driver should not outweigh ten small errors.
+# Error at which the loss changes from quadratic to linear, so that one mistake of the driver does
+# not outweigh ten small errors.
 _HUBER_BETA: Final = 0.1
 _MAX_INITIAL: Final = 0.95  # Keeps the initial output in the range where tanh can still learn.
 _MAX_GRADIENT: Final = 1.0
@@ -198,10 +198,7 @@ def learn(
 def _mirrors(
     data: Dataset, feels: bool, stated: float
 ) -> tuple[tuple[Mirror | None, Mirror | None], float, str]:
-    """Return the mirrors of actions and states, the share to mirror, and the reason for it.
-
-    A stated share of at least 0 is kept, unless a mirror image is unknown.
-    """
+    """Return the mirrors of actions and states, the share to mirror, and its reason."""
     try:
         mirror = mirror_of(data.action_layout)
         layout = data.state_layout
@@ -311,7 +308,9 @@ def _fit(
             if step == total or worse >= settings.patience:
                 break
         for group in optimizer.param_groups:
-            group["lr"] = rate * _share_of_rate(step, total, settings.warm_up)
+            # A linear warm-up, and half a cosine down to 0.
+            rising = min((step + 1) / settings.warm_up, 1.0) if settings.warm_up else 1.0
+            group["lr"] = rate * (rising * 0.5 * (1.0 + math.cos(math.pi * step / total)))
         pictures, states, targets = next(drawn)
         found = functional.dropout(network.train().perceive(pictures, states), settings.dropout)
         loss = _loss(network.hands(found), targets, settings.smoothing)
@@ -330,17 +329,8 @@ def _fit(
     return best_step
 
 
-def _share_of_rate(step: int, total: int, warm_up: int) -> float:
-    """Return the factor of the learning rate: a linear warm-up, and half a cosine down to 0."""
-    rising = min((step + 1) / warm_up, 1.0) if warm_up else 1.0
-    return rising * 0.5 * (1.0 + math.cos(math.pi * step / total))
-
-
 def best_temperature(logits: Tensor, target: Tensor) -> float:
-    """Return the softmax temperature with the smallest cross-entropy on held-out steps.
-
-    Logits have shape (n, classes), and targets are class indices, shape (n,).
-    """
+    """Return the best temperature for logits, (n, classes), and class indices, (n,)."""
     if len(target) < _MIN_CALIBRATION_STEPS:
         return 1.0
     losses = [float(functional.cross_entropy(logits / t, target)) for t in _TEMPERATURES]

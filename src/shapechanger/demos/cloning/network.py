@@ -40,8 +40,7 @@ _CELL: Final = 4  # Side of a cell, pixels.
 _DARK: Final = 8.0 / 255.0
 # Mean strength of an edge that is only noise; keeps uniform images from being amplified.
 _MIN_EDGE: Final = 1e-4
-# About the noise of a camera, as a share of full brightness; keeps a uniform image, such as that
-# of a covered lens, from being amplified into noise.
+# About a camera's noise, as a share of full brightness; keeps uniform images from being amplified.
 _MIN_SPREAD: Final = 0.02
 _MAX_DEVIATIONS: Final = 5.0  # Larger deviations of a state value carry no more information.
 
@@ -93,8 +92,7 @@ class Eyes(nn.Module):
         if self._cells is not None:
             seen = edges(pictures, self._cells) - 1.0
         else:
-            # Colours are last in memory, so that each image is one row: several times faster than
-            # over three dimensions.
+            # Each image is one row: several times faster than over three dimensions.
             rows = pictures.permute(0, 2, 3, 1).flatten(1)
             spread, mean = (x[:, None, None, None] for x in torch.std_mean(rows, dim=1))
             seen = (pictures - mean) / (spread + _MIN_SPREAD)
@@ -102,15 +100,11 @@ class Eyes(nn.Module):
 
 
 class Nerves(nn.Module):
-    """Encoder of a state.
+    """Encoder of a state, with layers of these widths; the last one is the number of features.
 
     Each value is normalised by the mean and standard deviation in the demonstrations. A missing
     value (NaN) is replaced by the mean and flagged in a second input; outliers are clipped at five
     standard deviations.
-
-    Args:
-        size: Number of values in a state.
-        widths: Widths of the layers; the last one is the number of features.
     """
 
     def __init__(self, size: int, widths: tuple[int, ...]) -> None:
@@ -154,7 +148,7 @@ class CameraNetwork(nn.Module):
         self.eyes, self.nerves = _one_or_several(eyes), _one_or_several(nerves)
         self.hands = nn.Linear(self.seen + self.felt, len(net.classes) or card.action_size)
         self.activation = nn.Softmax(dim=1) if net.classes else nn.Tanh()
-        # With colours last in memory, convolutions of a single image are a third faster.
+        # Colours last in memory: convolutions of a single image are a third faster.
         self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     def perceive(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
@@ -185,12 +179,7 @@ class CameraNetwork(nn.Module):
 
 
 class CameraPolicy(Clone):
-    """A clone for images, states or both.
-
-    Attributes:
-        network: The network.
-        card: Architecture and origin.
-    """
+    """A clone whose network is of PyTorch."""
 
     def __init__(self, network: CameraNetwork, card: PolicyCard) -> None:
         self.network = network.eval()
@@ -200,12 +189,9 @@ class CameraPolicy(Clone):
     def fresh(
         cls, settings: CloneSettings, seed: int, actions: Layout | None = None
     ) -> CameraPolicy:
-        """Return an untrained policy whose actions are in [-1, 1], from an image.
+        """Return an untrained policy of images, whose actions are in [-1, 1].
 
-        Args:
-            settings: Architecture of the network.
-            seed: Seed of the weights.
-            actions: Meaning of the actions; None for the steering and throttle of any vehicle.
+        `seed` is of the weights; without `actions`, it steers any vehicle by steering and throttle.
         """
         if actions is not None and actions.names == STEERING:
             actions = None

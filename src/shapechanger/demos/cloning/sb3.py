@@ -49,9 +49,7 @@ class NormedReLU(nn.Module):
 class ClonedPerception(BaseFeaturesExtractor):
     """Frozen encoders of a clone, from raw observations to features.
 
-    Args:
-        observation_space: Images, states, or a Dict of both under "image" and "state".
-        card: Card of the clone, as JSON.
+    Observations are images, states, or a Dict of both; the card of the clone is JSON.
     """
 
     def __init__(self, observation_space: Any, card: str) -> None:
@@ -140,11 +138,7 @@ def as_ppo(
     The actions of a policy with classes are indices of `policy.net.classes`: wrap the env in
     `gymnasium.wrappers.TransformAction`.
 
-    Args:
-        policy: The policy.
-        size: Rows and columns of the raw images; None for a policy without images.
-        seed: Seed of the learner.
-        **settings: Arguments of `stable_baselines3.PPO`, except the shape of the actor.
+    Its settings are arguments of `stable_baselines3.PPO`.
     """
     settings = {"device": "cpu", **settings}
     kwargs = _perception(policy) | {"net_arch": {"pi": [], "vf": [64, 64]}, "ortho_init": False}
