@@ -164,4 +164,4 @@ def test_a_file_that_starts_outside_its_limits_starts_inside(limits: str, gap_m:
     for pose in (start, rules.feasible(start + 0.02, data, start)):
         assert np.all(rules.lowest <= pose)
         assert np.all(pose <= rules.highest)
-        assert _gap(model, pose) == pytest.approx(gap_m, abs=1e-4)
+        assert _gap(model, pose) <= gap_m + 1e-4

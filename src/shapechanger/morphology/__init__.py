@@ -27,14 +27,23 @@ from shapechanger.morphology.body import (
     to_json,
 )
 from shapechanger.morphology.edits import EDITS, Edit
-from shapechanger.morphology.edits.joints import AddFreeJoint, AddMotor, JointRange, Lock
-from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
+from shapechanger.morphology.edits.limbs import (
+    AddFreeJoint,
+    AddLimb,
+    AddMotor,
+    AddSegment,
+    Cut,
+    Lock,
+    Remove,
+    Split,
+)
 from shapechanger.morphology.edits.places import (
     AddFloor,
     PlaceBody,
     PlaceGeom,
+    Radius,
     StartHeight,
-    TotalMass,
+    Stretch,
 )
 from shapechanger.morphology.edits.values import (
     Damping,
@@ -42,10 +51,10 @@ from shapechanger.morphology.edits.values import (
     Friction,
     Gear,
     Gravity,
+    JointRange,
     Mass,
-    Radius,
     Stiffness,
-    Stretch,
+    TotalMass,
 )
 from shapechanger.morphology.spec import name_elements
 

@@ -6,7 +6,8 @@ limbs are the robot's: of all that its actuators move, directly or by a coupling
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections.abc import Iterator
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -29,19 +30,22 @@ _FAR_M: Final = 1000.0
 _LOCKED: Final = 1e5
 # Tolerance of the vertical part of an axis that counts as vertical.
 _VERTICAL: Final = 1e-6
-# Loops are closed by Gauss-Newton steps on MuJoCo's own Jacobian of these equalities.
+# Equalities that a pose can close, by Gauss-Newton steps on MuJoCo's own Jacobian.
 _SOLVED: Final = [
     int(kind) for kind in (_E.mjEQ_CONNECT, _E.mjEQ_WELD, _E.mjEQ_JOINT, _E.mjEQ_TENDON)
 ]
+CLOSED: Final = 1e-9
+"""Residual of an equality that is closed, m or rad; above the rounding of a compiled model."""
+# A longer step, rad or m, can jump to another way to assemble the loop.
+_LONGEST_STEP: Final = 0.2
+# Steps towards each start pose, and its largest violation, m or rad.
 _MOST_STEPS: Final = 40
-_MOST_HALVINGS: Final = 6
-# Largest violation, m or rad, of a closed pose, and the one at which steps end.
-_CLOSED: Final = 1e-4
-_EXACT: Final = 1e-9
-# Singular values below this share of the largest do not move a joint.
-_SMALLEST_SHARE: Final = 1e-6
+_START_CLOSED: Final = 1e-4
+_UNLIMITED: Final = np.array([[-np.inf], [np.inf]])
+# Singular values below this share of the largest do not close a loop.
+_SINGULAR: Final = 1e-6
 # Shares of a drawn deviation that are tried, until one can be closed.
-_SHARES: Final = (1.0, 0.5, 0.25, 0.125)
+_SHARES: Final = (0.5, 0.25, 0.125)
 # Deviations from a drawn pose, rad or m, that are tried where the file's own pose is outside its
 # limits: steps get stuck at a stretched arm and at limits. Of Metaworld's Sawyer one in ten ends
 # closed.
@@ -269,8 +273,6 @@ class StartRules:
         joints = np.flatnonzero(limited & self._robot[model.jnt_bodyid])
         self.lowest, self.highest = model.jnt_range[joints].T
         self.limited_places = model.jnt_qposadr[joints]
-        if model.neq:
-            self._movable, self._dofs = self.robot_dofs, model.jnt_dofadr[joints]
         self.floor_pairs: list[tuple[int, int]] = []
         of_world = model.body_weldid[model.geom_bodyid] == 0
         own = ~of_world & self._robot[model.geom_bodyid]
@@ -331,13 +333,13 @@ class StartRules:
         mujoco.mj_normalizeQuat(self._model, pose)
         self._lift(pose, data)
         if self._model.neq:
-            origin = self._model.qpos0 if start is None else start
-            goal = max(_CLOSED, _largest(self._rows(origin, data)[0]) + _EXACT)
-            pose = self._closed(pose, origin, goal, data)
+            start = self._model.qpos0 if start is None else start
+            goal = max(_START_CLOSED, self._violation(start, data) + CLOSED)
+            pose = self._closed(pose, start, goal, data)
             lifted = pose.copy()
             self._lift(lifted, data)
             # A robot that a weld or a rope holds hangs there, and does not stand.
-            if _largest(self._rows(lifted, data)[0]) <= goal:
+            if self._violation(lifted, data) <= goal:
                 pose = lifted
         return pose
 
@@ -345,8 +347,9 @@ class StartRules:
         """Return the velocity (nv,) nearest to a drawn one that keeps a pose (nq,) closed."""
         if not self._model.neq:
             return velocity
-        _, jacobian = self._rows(pose, data)
-        return velocity - _least_squares(jacobian, jacobian @ velocity)
+        self._violation(pose, data)
+        jacobian = np.where(self.robot_dofs, equality_rows(self._model, data)[2], 0.0)
+        return velocity - np.linalg.pinv(jacobian, _SINGULAR) @ (jacobian @ velocity)
 
     def _lift(self, pose: _Array, data: mujoco.MjData) -> None:
         """Lift the trunk of a pose until its feet are not in the floor, in place."""
@@ -356,63 +359,38 @@ class StartRules:
             if (gap := self.floor_gap(data)) < 0.0:
                 self.lift.raise_by(pose, -gap)
 
-    def _closed(self, drawn: _Array, start: _Array, goal: float, data: mujoco.MjData) -> _Array:
-        """Return the pose next to a drawn one, inside the limits, with no larger violation.
+    def _violation(self, pose: _Array, data: mujoco.MjData) -> float:
+        """Return the largest violation of an equality at a pose, which `data` take."""
+        data.qpos[:] = pose
+        mujoco.mj_fwdPosition(self._model, data)
+        return _largest(equality_rows(self._model, data)[1])
 
-        Smaller deviations from the start are tried in turn, and at last none. Of a start outside
-        the limits, the pose inside them that is closed best is looked for around the drawn one.
-        """
-        deviation = np.zeros(self._model.nv)
-        mujoco.mj_differentiatePos(self._model, deviation, 1.0, start, drawn)
-        for share in _SHARES:
-            pose = drawn.copy() if share == 1.0 else self._moved(start, share * deviation)
-            pose, violation = self._solved(pose, data)
+    def _closed(self, drawn: _Array, start: _Array, goal: float, data: mujoco.MjData) -> _Array:
+        """Return the pose next to a drawn one, inside the limits, with no larger violation."""
+        is_inside = bool(np.all(start == self.keep_within_limits(start)))
+        best, least = start.copy() if is_inside else drawn, np.inf
+        for pose in self._tries(drawn, start, is_inside):
+            self._violation(pose, data)
+            violation = close(self._model, data, self.robot_dofs, _MOST_STEPS)
             if violation <= goal:
-                return pose
-        if np.all(start == self.keep_within_limits(start)):
-            return start.copy()
-        rng, best, least = np.random.default_rng(0), drawn, np.inf
-        for _ in range(_MOST_BENDS):
-            bend = np.where(self._movable, rng.uniform(-_BEND, _BEND, self._model.nv), 0.0)
-            pose, violation = self._solved(self._moved(drawn, bend), data)
-            if violation < least:
-                best, least = pose, violation
-            if least <= goal:
-                break
+                return data.qpos.copy()
+            if violation < least and not is_inside:
+                best, least = data.qpos.copy(), violation
         return best
 
-    def _solved(self, pose: _Array, data: mujoco.MjData) -> tuple[_Array, float]:
-        """Return the nearest closed pose that steps reach, and its largest violation."""
-        gaps, jacobian = self._rows(pose, data)
-        for _ in range(_MOST_STEPS):
-            if _largest(gaps) <= _EXACT:
-                break
-            step = self._step(pose, gaps, jacobian)
-            for _ in range(_MOST_HALVINGS):
-                tried = self._moved(pose, step)
-                new_gaps, new_jacobian = self._rows(tried, data)
-                if np.linalg.norm(new_gaps) < np.linalg.norm(gaps):
-                    pose, gaps, jacobian = tried, new_gaps, new_jacobian
-                    break
-                step = 0.5 * step
-            else:
-                break
-        return pose, _largest(gaps)
+    def _tries(self, drawn: _Array, start: _Array, is_inside: bool) -> Iterator[_Array]:
+        """Yield poses to close: the drawn one, and then with smaller deviations from the start.
 
-    def _step(self, pose: _Array, gaps: _Array, jacobian: _Array) -> _Array:
-        """Return the smallest step, (nv,), that closes the gaps and presses at no limit."""
-        free = jacobian.copy()
-        step = _least_squares(free, -gaps)
-        for _ in self._dofs:
-            value, moved = pose[self.limited_places], step[self._dofs]
-            pressed = ((value <= self.lowest) & (moved < 0.0)) | (
-                (value >= self.highest) & (moved > 0.0)
-            )
-            if not pressed.any():
-                break
-            free[:, self._dofs[pressed]] = 0.0
-            step = _least_squares(free, -gaps)
-        return step
+        Of a start outside the limits, poses around the drawn one follow.
+        """
+        yield drawn
+        deviation, rng = np.zeros(self._model.nv), np.random.default_rng(0)
+        mujoco.mj_differentiatePos(self._model, deviation, 1.0, start, drawn)
+        for share in _SHARES:
+            yield self._moved(start, share * deviation)
+        for _ in range(0 if is_inside else _MOST_BENDS):
+            bend = rng.uniform(-_BEND, _BEND, self._model.nv)
+            yield self._moved(drawn, np.where(self.robot_dofs, bend, 0.0))
 
     def _moved(self, pose: _Array, step: _Array) -> _Array:
         """Return a pose moved by a step (nv,), inside the limits."""
@@ -420,30 +398,56 @@ class StartRules:
         mujoco.mj_integratePos(self._model, moved, step, 1.0)
         return self.keep_within_limits(moved)
 
-    def _rows(self, pose: _Array, data: mujoco.MjData) -> tuple[_Array, _Array]:
-        """Return the violation of each equality, (n,), and its Jacobian, (n, nv)."""
-        model = self._model
-        data.qpos[:] = pose
+
+# --- Closed loops ------------------------------------------------------------------------------
+
+
+def equality_rows(
+    model: mujoco.MjModel, data: mujoco.MjData
+) -> tuple[NDArray[np.int32], _Array, _Array]:
+    """Return the equality, the violation and the Jacobian (n, nv) of each row of equalities.
+
+    The data have gone through `mj_fwdPosition`.
+    """
+    ids = data.efc_id[: int(data.ne)]
+    rows = np.flatnonzero(np.isin(model.eq_type[ids], _SOLVED))
+    dense = np.zeros((int(data.nefc), model.nv))
+    if mujoco.mj_isSparse(model):
+        mujoco.mju_sparse2dense(
+            dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+        )
+    else:
+        dense[:] = data.efc_J.reshape(dense.shape)
+    return ids[rows], data.efc_pos[rows], dense[rows]
+
+
+def close(
+    model: mujoco.MjModel, data: mujoco.MjData, movable: NDArray[np.bool_], most_steps: int
+) -> float:
+    """Move the pose in `data` to the nearest in which the equalities hold.
+
+    Only the `movable` degrees of freedom (nv,) move; hinges and slides stay inside their limits, or
+    get no farther outside. The largest violation that is left is returned, m or rad.
+    """
+    scalar, at_limit = np.flatnonzero(model.jnt_type > int(_J.mjJNT_BALL)), np.zeros(model.nv, bool)
+    places, dofs = model.jnt_qposadr[scalar], model.jnt_dofadr[scalar]
+    low, high = np.where(model.jnt_limited[scalar], model.jnt_range[scalar].T, _UNLIMITED)
+    low, high = np.minimum(low, data.qpos[places]), np.maximum(high, data.qpos[places])
+    for _ in range(most_steps):
+        _, gaps, jacobian = equality_rows(model, data)
+        if _largest(gaps) <= CLOSED:
+            break
+        step, moving = np.zeros(model.nv), movable & ~at_limit
+        step[moving] = -np.linalg.pinv(jacobian[:, moving], _SINGULAR) @ gaps
+        step *= min(1.0, _LONGEST_STEP / max(_largest(step), _LONGEST_STEP))
+        mujoco.mj_integratePos(model, data.qpos, step, 1.0)
+        clipped = np.clip(data.qpos[places], low, high)
+        # A joint at its limit is left out of the next step, which the others must make.
+        at_limit[dofs] = clipped != data.qpos[places]
+        data.qpos[places] = clipped
         mujoco.mj_fwdPosition(model, data)
-        count = int(data.ne)
-        rows = np.flatnonzero(np.isin(model.eq_type[data.efc_id[:count]], _SOLVED))
-        dense = np.zeros((int(data.nefc), model.nv))
-        if mujoco.mj_isSparse(model):
-            mujoco.mju_sparse2dense(
-                dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
-            )
-        else:
-            dense[:] = data.efc_J.reshape(dense.shape)
-        movable: _Array = np.where(self._movable, dense[rows], 0.0)
-        return data.efc_pos[rows].copy(), movable
+    return _largest(equality_rows(model, data)[1])
 
 
-def _largest(gaps: _Array) -> float:
-    return float(np.abs(gaps).max(initial=0.0))
-
-
-def _least_squares(jacobian: _Array, wanted: _Array) -> _Array:
-    """Return the smallest step (nv,) that comes nearest to the wanted change of each row."""
-    # NumPy's types leave out the kind of the numbers.
-    step: Any = np.linalg.pinv(jacobian, rcond=_SMALLEST_SHARE) @ wanted
-    return step
+def _largest(numbers: _Array) -> float:
+    return float(np.abs(numbers).max(initial=0.0))

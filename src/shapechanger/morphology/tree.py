@@ -93,25 +93,26 @@ def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
     trunk, robot = travelling_body(model) or 0, robot_bodies(model)
     joints = [
         j
-        for j in range(model.njnt)
-        if model.jnt_type[j] in _MOVES_ONE_WAY
-        and robot[model.jnt_bodyid[j]]
-        and (model.jnt_bodyid[j] != trunk or trunk == 0)
+        for j in np.flatnonzero(np.isin(model.jnt_type, _MOVES_ONE_WAY)).tolist()
+        if robot[model.jnt_bodyid[j]] and (model.jnt_bodyid[j] != trunk or trunk == 0)
     ]
     # The last joint of a body moves it.
     mover = {int(model.jnt_bodyid[j]): j for j in joints}
     owner: dict[int, int | None] = {0: None}
     for body in range(1, model.nbody):
         owner[body] = mover.get(body, owner[int(model.body_parentid[body])])
-    moved_by = _actuators_by_joint(model, data, joints, owner)
+    moments = _moments(model, data)
+    moved_by = _actuators_by_joint(model, moments, joints, owner)
     limbs: list[Limb] = []
     for j in joints:
-        own = [body for body, mover_of in owner.items() if mover_of == j]
-        numbers = _limb_numbers(model, data, j, own, trunk, moved_by.get(j))
+        own, actuator, strength = [body for body in owner if owner[body] == j], "", 0.0
+        if (moving := moved_by.get(j)) is not None:
+            actuator = model.actuator(moving).name
+            strength = _force(model, moving) * moments[moving, model.jnt_dofadr[j]]
+        numbers = _limb_numbers(model, data, j, own, trunk, strength)
         names = tuple(model.body(body).name for body in own)
-        actuator = model.actuator(moved_by[j]).name if j in moved_by else ""
         limbs.append(Limb(model.joint(j).name, names, actuator, numbers))
-    own = [body for body, mover_of in owner.items() if mover_of is None and robot[body]]
+    own = [body for body in owner if owner[body] is None and robot[body]]
     own = own if trunk else [0, *own]
     floor = np.flatnonzero(model.geom_bodyid == 0)
     return Tree(
@@ -128,13 +129,36 @@ def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
     )
 
 
+def _moments(model: mujoco.MjModel, data: mujoco.MjData) -> _Array:
+    """Return the torque or force on each degree of freedom for a force of 1 of each actuator."""
+    outputs = np.zeros((len(data.moment_rownnz), model.nv))
+    mujoco.mju_sparse2dense(
+        *(outputs, data.actuator_moment, data.moment_rownnz, data.moment_rowadr),
+        data.moment_colind,
+    )
+    ends = zip(model.actuator_outadr, model.actuator_outnum, strict=True)
+    return np.array([np.abs(outputs[at : at + n]).max(axis=0, initial=0.0) for at, n in ends])
+
+
+def _force(model: mujoco.MjModel, actuator: int) -> float:
+    """Return the force of an actuator for a control of 1, N or N·m.
+
+    A muscle has a peak force; a negative one is derived from a scale and the inertia that it moves.
+    """
+    gain = model.actuator_gainprm[actuator]
+    if model.actuator_gaintype[actuator] != mujoco.mjtGain.mjGAIN_MUSCLE:
+        return abs(float(gain[0]))
+    moved = max(float(model.actuator_acc0[actuator]), _NO_MOMENT)
+    return float(gain[2]) if gain[2] >= 0.0 else float(gain[3]) / moved
+
+
 def _limb_numbers(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     joint: int,
     bodies: list[int],
     trunk: int,
-    actuator: int | None,
+    strength: float,
 ) -> tuple[float, ...]:
     """Return the numbers of a limb."""
     body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
@@ -142,16 +166,6 @@ def _limb_numbers(
     anchor: _Array = data.xanchor[joint]
     end, _ = _farthest(model, data, bodies, anchor)
     limited = bool(model.jnt_limited[joint])
-    strength = 0.0
-    if actuator is not None:
-        # The force for a control of 1, N or N·m. A muscle has a peak force; a negative one is
-        # derived from a scale and the inertia that it moves.
-        gain, strength = model.actuator_gainprm[actuator], _moment(model, data, actuator, dof)
-        if model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE:
-            moved = max(float(model.actuator_acc0[actuator]), _NO_MOMENT)
-            strength *= float(gain[2]) if gain[2] >= 0.0 else float(gain[3]) / moved
-        else:
-            strength *= abs(float(gain[0]))
     depth, above = 0, body
     while above:
         depth += int(above != trunk and model.body_jntnum[above] > 0)
@@ -171,34 +185,21 @@ def _limb_numbers(
 
 
 def _actuators_by_joint(
-    model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], owner: dict[int, int | None]
+    model: mujoco.MjModel, moments: _Array, joints: list[int], owner: dict[int, int | None]
 ) -> dict[int, int]:
     """Return the actuator that moves each joint; see `Limb.actuator`."""
     to_joint = np.isin(model.actuator_trntype, _TO_JOINT)
     targets: list[int] = model.actuator_trnid[:, 0].tolist()
     found = {targets[actuator]: actuator for actuator in np.flatnonzero(to_joint).tolist()}
     for actuator in np.flatnonzero(~to_joint).tolist():
-        free = (j for j in joints if j not in found)
-        moments = {j: _moment(model, data, actuator, int(model.jnt_dofadr[j])) for j in free}
-        most, joint = max(moments.values(), default=0.0), None
+        free = {j: moments[actuator, model.jnt_dofadr[j]] for j in joints if j not in found}
+        most, joint = max(free.values(), default=0.0), None
         if most > _NO_MOMENT:
-            joint = next(j for j, moment in moments.items() if moment > (1.0 - _EQUAL) * most)
+            joint = next(j for j, moment in free.items() if moment > (1.0 - _EQUAL) * most)
         elif model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_BODY:
             joint = owner[targets[actuator]]  # Adhesion moves its body only in contact.
         if joint is not None:
             found.setdefault(joint, actuator)
-    return found
-
-
-def _moment(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, dof: int) -> float:
-    """Return the torque or force on a degree of freedom for a force of 1 of an actuator."""
-    first = int(model.actuator_outadr[actuator])
-    found = 0.0
-    for row in range(first, first + int(model.actuator_outnum[actuator])):
-        start = int(data.moment_rowadr[row])
-        entries = slice(start, start + int(data.moment_rownnz[row]))
-        on_dof = data.actuator_moment[entries][data.moment_colind[entries] == dof]
-        found = max(found, float(np.abs(on_dof).max(initial=0.0)))
     return found
 
 

@@ -56,7 +56,8 @@ class Edit(
     """One change to a model.
 
     A subclass with an `apply` is known to JSON by the snake case of its name, as worker processes
-    and files need, once its module is imported. The types of its fields, with their bounds as
+    and files need, once its module is imported; a base of several kinds has no `apply`, or a name
+    that begins with an underscore. The types of its fields, with their bounds as
     `msgspec.Meta`, are checked when an edit is made.
 
     Attributes:
@@ -73,7 +74,7 @@ class Edit(
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
-        if "apply" not in vars(cls):
+        if cls.apply is Edit.apply or cls.__name__.startswith("_"):
             return  # A base of several kinds.
         tag = _tag(cls.__name__)
         known = EDITS.get(tag, cls)

@@ -1,9 +1,13 @@
-"""Edits of the structure of a body: cut, remove, split, add."""
+"""Edits of the structure of a body: lock, drive and free joints; cut, remove, split and add limbs.
+
+A URDF file has no motors and is fixed to the world: `AddMotor` and `AddFreeJoint` make a robot of
+it that can be run.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final
 
 import mujoco
 import numpy as np
@@ -18,67 +22,149 @@ from shapechanger.morphology.edits import (
     part_of_the_way,
     require_gear,
 )
-from shapechanger.morphology.edits.joints import add_motor
 from shapechanger.morphology.edits.values import scale_strength
 from shapechanger.morphology.spec import (
     LEAST_MASS,
+    geometry,
+    grafting,
+    references,
     require_free_name,
     select,
     select_limbs,
-)
-from shapechanger.morphology.spec.geometry import (
-    LONG,
-    NearPart,
-    Plane,
-    anchor,
-    carry_outwards,
-    far_end,
-    held_at,
-    move_by,
-    place_of,
-    require_geometry,
-    resize_geom,
-    scale_geom_mass,
-    set_ends,
-    set_limits,
-    shorten,
-    stretched,
-    volume,
-)
-from shapechanger.morphology.spec.grafting import (
-    copy_element,
-    copy_limb,
-    move,
-    share_contacts,
-)
-from shapechanger.morphology.spec.references import (
-    elements_of,
-    key_of,
-    moves_only,
-    path_elements,
-    references,
-    release_drawings,
-    remove_limb,
-    require_divisible,
-    require_removable,
-    require_unnamed,
-    subtree,
 )
 
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.carried import Keyframes
 
+_J: Final = mujoco.mjtJoint
 _O: Final = mujoco.mjtObj
+# MuJoCo needs a range above zero: smallest range of a partly locked joint.
+_NARROWEST_RAD: Final = 1e-3
 # MuJoCo refuses bodies of almost no mass, so a limb that exists in part is never smaller than this
-# share of its full size, which is a millionth of its mass.
+# share of its full size, which is a millionth of its mass. A motor is never weaker than this share.
 _SMALLEST_PART: Final = 0.01
 # A geom that is divided this far from the axis of its segment lies on it, m.
 _ON_THE_AXIS_M: Final = 1e-12
-# Fields of a joint's resistance.
+# Fields of the resistance of a joint or tendon, and those that a hinge takes from another.
+_RESISTANCE: Final = ("armature", "damping", "stiffness", "frictionloss")
 _HINGE_FIELDS: Final = (
-    *("armature", "damping", "stiffness", "frictionloss", "margin"),
+    *(*_RESISTANCE, "margin"),
     *("solref_limit", "solimp_limit", "solref_friction", "solimp_friction"),
 )
+
+
+class Lock(Edit, frozen=True):
+    """Lock hinges or slides at a position: remove the joints and their motors, keep the limbs.
+
+    A joint that is coupled to a locked one is held where the coupling puts it. Both spaces shrink,
+    so a policy needs a body map to be transferred; the rule `hold` of the map presents the locked
+    position to the policy.
+
+    Attributes:
+        joint: Name or glob of the joints.
+        position: Position at which it is locked, rad or m; None for the middle of its range.
+    """
+
+    joint: str
+    position: float | None = None
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Lock every joint that fits."""
+        joints = select("joint", self.joint, spec.joints)
+        by: dict[str, float] = {}
+        for joint in joints:
+            position, old = self.position, geometry.limits(joint)
+            if position is None and old is None:
+                raise MorphologyError(
+                    f"{joint.name!r} slides without limits, so it has no middle: give a position."
+                )
+            position = 0.5 * sum(old or ()) if position is None else position
+            by[joint.name] = position - geometry.reference_of(joint)
+            if self.amount < 1.0:
+                far = 1.0 / self.amount
+                ends = np.array(old or (position - far, position + far))
+                narrow = max(1.0 - self.amount, _NARROWEST_RAD / (ends[1] - ends[0]))
+                geometry.set_limits(joint, *(position + narrow * (ends - position)))
+        for joint in joints if self.amount == 1.0 else ():
+            geometry.displace(joint, by[joint.name])
+            references.remove_joint(spec, joint, by)
+
+
+class AddMotor(Edit, frozen=True):
+    """Add a motor to joints that have none, named after the joint, with controls from -1 to 1.
+
+    Attributes:
+        joint: Name or glob of the joints; those of a glob that have a motor, that an equality
+            makes follow another joint, or that no single motor can move, are left as they are.
+        gear: Torque, N·m, or force, N, for a control of 1; None for the largest that the model
+            allows the joint (`effort` in URDF, `actuatorfrcrange` in MJCF).
+    """
+
+    needs: ClassVar = (mujoco.mjtDisableBit.mjDSBL_ACTUATION, "actuators")
+    joint: str
+    gear: float | None = None
+
+    def check(self) -> None:
+        """Refuse a gear of zero."""
+        require_gear(self.gear)
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Add a motor to every joint that fits and has none."""
+        moved = {each.target for each in spec.actuators if each.trntype in references.OF_JOINTS}
+        # This includes models that make two joints follow each other: one of them has a motor.
+        couplings = [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT]
+        moved |= {e.name1 for e in couplings if e.name2 and e.active and e.name1 != self.joint}
+        found = select("joint", self.joint, spec.joints)
+        one_way = (joint for joint in found if joint.type in (_J.mjJNT_HINGE, _J.mjJNT_SLIDE))
+        joints = [joint for joint in one_way if joint.name not in moved]
+        if not joints:
+            raise MorphologyError(
+                f"Each hinge and slide that matches {self.joint!r} has a motor, or none matches; "
+                "a joint that follows another one needs none."
+            )
+        for joint in joints:
+            gear = float(abs(joint.actfrcrange).max()) if self.gear is None else self.gear
+            if not gear:
+                raise MorphologyError(
+                    f"The model states no largest torque or force of {joint.name!r}: give a gear."
+                )
+            _add_motor(spec, joint.name, gear * max(self.amount, _SMALLEST_PART))
+
+
+def _add_motor(spec: mujoco.MjSpec, name: str, gear: float) -> None:
+    """Add a motor to the joint of its name; its gear is the N·m or N for a control of 1."""
+    require_free_name(spec, "actuator", name)
+    motor = spec.add_actuator(
+        name=name,
+        target=name,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        ctrlrange=[-1.0, 1.0],
+        gear=[gear, 0.0, 0.0, 0.0, 0.0, 0.0],
+    )
+    motor.set_to_motor()
+
+
+class AddFreeJoint(Edit, frozen=True):
+    """Set a body that is fixed to the world free, with everything attached to it.
+
+    Attributes:
+        body: Name of a body on the world that has no joint.
+    """
+
+    body: str
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Add the free joint."""
+        body = select("trunk", self.body, spec.worldbody.bodies)[0]
+        if body.joints:
+            raise MorphologyError(
+                f"{body.name!r} is not fixed: it has the joint {body.joints[0].name!r}."
+            )
+        # A body that MuJoCo has merged with the world cannot move.
+        spec.compiler.fusestatic = False
+        require_free_name(spec, "joint", f"{body.name}_free")
+        body.add_freejoint(name=f"{body.name}_free")
 
 
 class Cut(Edit, frozen=True):
@@ -98,27 +184,27 @@ class Cut(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Cut every segment that fits."""
         for body in select_limbs(spec, self.body, "cut"):
-            require_geometry(spec, body)
-            plane = Plane(body, self.keep)
+            geometry.require_geometry(spec, body)
+            plane = geometry.Plane(body, self.keep)
             if self.keep == 1.0:
                 continue
-            release_drawings(spec, {key_of(body)})
+            references.release_drawings(spec, {references.key_of(body)})
             self._cut_geoms(spec, body, plane)
             share = part_of_the_way(1.0, self.keep, self.amount)
-            for child in plane.children_beyond():
+            for child in plane.children:
                 if self.amount < 1.0:
-                    there = held_at(child)
-                    child.pos = child.pos + (stretched(there, anchor(body), share) - there)
+                    there = geometry.held_at(child)
+                    child.pos += geometry.stretched(there, geometry.anchor(body), share) - there
                 _take_away(spec, child, self.amount)
-            for point in plane.points_beyond():
+            for point in plane.points:
                 if plane.is_at_end(point):
-                    move_by(point, share * plane.along - plane.along)
+                    geometry.move_by(point, share * plane.along - plane.along)
                     continue
-                require_unnamed(spec, key_of(point), "lies beyond the cut")
+                references.require_unnamed(spec, references.key_of(point), "lies beyond the cut")
                 if self.amount == 1.0:
                     spec.delete(point)
 
-    def _cut_geoms(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, plane: Plane) -> None:
+    def _cut_geoms(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, plane: geometry.Plane) -> None:
         """Shorten the geoms that the plane cuts, and remove those that lie beyond it."""
         pieces = [(geom, plane.piece_of(geom)) for geom in body.geoms]
         if not any(piece.share for _, piece in pieces):
@@ -128,13 +214,14 @@ class Cut(Edit, frozen=True):
             )
         for geom, piece in pieces:
             if not piece.share:
-                require_unnamed(spec, key_of(geom), "lies beyond the cut")
+                references.require_unnamed(spec, references.key_of(geom), "lies beyond the cut")
                 if self.amount == 1.0:
                     spec.delete(geom)
                 else:
-                    resize_geom(geom, place_of(geom), max(1.0 - self.amount, _SMALLEST_PART))
+                    part = max(1.0 - self.amount, _SMALLEST_PART)
+                    geometry.resize_geom(geom, geometry.middle_of(geom), part)
             elif piece.share < 1.0:
-                shorten(geom, piece, part_of_the_way(1.0, piece.share, self.amount))
+                geometry.shorten(geom, piece, part_of_the_way(1.0, piece.share, self.amount))
 
 
 class Remove(Edit, frozen=True):
@@ -150,6 +237,17 @@ class Remove(Edit, frozen=True):
         """Remove every limb that fits."""
         for body in select_limbs(spec, self.body, "removed"):
             _take_away(spec, body, self.amount)
+
+
+def _check_hinge(edit: Split | AddSegment) -> None:
+    """Refuse a hinge that MuJoCo would refuse."""
+    if not edit.lower < edit.upper:
+        raise MorphologyError(
+            f"A hinge needs a lower limit below its upper one, got {edit.lower}, {edit.upper}."
+        )
+    require_gear(edit.gear)
+    if edit.axis is not None and not any(edit.axis):
+        raise MorphologyError("The axis of a hinge must not be zero.")
 
 
 class Split(Edit, frozen=True):
@@ -178,54 +276,45 @@ class Split(Edit, frozen=True):
     gear: float | None = None
     axis: Vector | None = None
 
-    def check(self) -> None:
-        """Refuse a range, gear or axis of zero."""
-        _check_hinge(self)
+    check = _check_hinge
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Split the segment."""
         body = next(select_limbs(spec, self.body, "split"))
-        require_geometry(spec, body)
-        plane = Plane(body, self.at)
+        geometry.require_geometry(spec, body)
+        plane = geometry.Plane(body, self.at)
         pieces = {geom.name: plane.piece_of(geom) for geom in body.geoms}
-        halves = {
-            n: f"{n}_of_{self.name}" for n, piece in pieces.items() if 0.0 < piece.share < 1.0
-        }
-        require_divisible(spec, body, halves)
-        release_drawings(spec, {key_of(body)})
+        cut = [name for name, piece in pieces.items() if 0.0 < piece.share < 1.0]
+        halves = {name: f"{name}_of_{self.name}" for name in cut}
+        references.require_divisible(spec, body, halves)
+        references.release_drawings(spec, {references.key_of(body)})
         beyond = [spec.geom(name) for name, piece in pieces.items() if not piece.share]
-        points, children = plane.points_beyond(), plane.children_beyond()
         part = _add_segment(spec, body, self, plane.place, self.amount)
-        for point in (*beyond, *points):
-            move_by(move(spec, point, part), -plane.place)
+        for point in (*beyond, *plane.points, *plane.children):
+            geometry.move_by(grafting.move(spec, point, part), -plane.place)
         for name, half in halves.items():
-            geom, piece = spec.geom(name), pieces[name]
-            copy = copy_element(spec, geom, part, half)
-            self._divide(geom, copy, piece, plane.place)
-        for child in children:
-            offset = child.pos - plane.place
-            move(spec, child, part).pos = offset
-        share_contacts(spec, body, part, halves)
+            geom = spec.geom(name)
+            copy = grafting.copy_element(spec, geom, part, half)
+            self._divide(geom, copy, pieces[name], plane.place)
+        grafting.share_contacts(spec, body, part, halves)
 
-    def _divide(
-        self, geom: mujoco.MjsGeom, copy: mujoco.MjsGeom, piece: NearPart, place: np.ndarray
-    ) -> None:
+    def _divide(self, geom: Any, copy: Any, piece: geometry.NearPart, place: np.ndarray) -> None:
         """Divide a geom: it becomes the nearer half, a copy on the other body the farther one."""
-        whole = volume(geom)
+        whole = geometry.volume(geom)
         # Scaled about its near end, which is then moved to the cut.
-        move_by(copy, -piece.near)
-        shorten(copy, piece._replace(near=np.zeros(3)), 1.0 - piece.share)
-        end = piece.near + 2.0 * (place_of(geom) - piece.near)
+        geometry.move_by(copy, -piece.near)
+        geometry.shorten(copy, piece._replace(near=np.zeros(3)), 1.0 - piece.share)
+        end = piece.near + 2.0 * (geometry.middle_of(geom) - piece.near)
         offset = piece.near + piece.share * (end - piece.near) - place
         if float(np.linalg.norm(offset)) > _ON_THE_AXIS_M:
-            move_by(copy, offset)
-        shorten(geom, piece, piece.share)
+            geometry.move_by(copy, offset)
+        geometry.shorten(geom, piece, piece.share)
         # The rounded ends at the split overlap. Their mass grows with the amount of the split.
-        volumes = [volume(half) for half in (geom, copy)]
+        volumes = [geometry.volume(half) for half in (geom, copy)]
         rounded_end = 0.5 * (sum(volumes) - whole)
         for half, own in zip((geom, copy), volumes, strict=True):
             without = 1.0 - rounded_end / own
-            scale_geom_mass(half, part_of_the_way(without, 1.0, self.amount))
+            geometry.scale_geom_mass(half, part_of_the_way(without, 1.0, self.amount))
 
 
 class AddSegment(Edit, frozen=True):
@@ -263,14 +352,14 @@ class AddSegment(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add the segment."""
         body = select("body", self.body, spec.bodies[1:])[0]
-        require_geometry(spec, body)
-        part = _add_segment(spec, body, self, far_end(body), 1.0)
-        model_geom = next(geom for geom in body.geoms if geom.type in LONG)
-        geom = copy_element(spec, model_geom, part, f"{self.name}_geom")
+        geometry.require_geometry(spec, body)
+        part = _add_segment(spec, body, self, geometry.far_end(body), 1.0)
+        model_geom = next(geom for geom in body.geoms if geom.type in geometry.LONG)
+        geom = grafting.copy_element(spec, model_geom, part, f"{self.name}_geom")
         geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
         if not math.isnan(geom.mass):
-            geom.density, geom.mass = geom.mass / volume(model_geom), math.nan
-        set_ends(geom, np.array([0.0, 0.0, 0.0, *self.end]))
+            geom.density, geom.mass = geom.mass / geometry.volume(model_geom), math.nan
+        geometry.set_ends(geom, np.array([0.0, 0.0, 0.0, *self.end]))
         if self.radius is not None:
             geom.size = [self.radius, 0.0, 0.0]
         if self.amount != 1.0:
@@ -296,7 +385,7 @@ class AddLimb(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add the limb."""
         limb = next(select_limbs(spec, self.like, "copied"))
-        copy = copy_limb(spec, limb, self.suffix, self.angle)
+        copy = grafting.copy_limb(spec, limb, self.suffix, self.angle)
         if self.size != 1.0:
             _resize_limb(spec, copy, self.size)
         if self.amount != 1.0:
@@ -308,23 +397,12 @@ class AddLimb(Edit, frozen=True):
         keyframes.copy({n: n.removesuffix(self.suffix) for n in named if n.endswith(self.suffix)})
 
 
-def _check_hinge(edit: Split | AddSegment) -> None:
-    """Refuse a hinge that MuJoCo would refuse."""
-    if not edit.lower < edit.upper:
-        raise MorphologyError(
-            f"A hinge needs a lower limit below its upper one, got {edit.lower}, {edit.upper}."
-        )
-    require_gear(edit.gear)
-    if edit.axis is not None and not any(edit.axis):
-        raise MorphologyError("The axis of a hinge must not be zero.")
-
-
 def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None:
     """Remove a limb; at an amount below 1, make it smaller and weaker instead."""
     if amount == 1.0:
-        remove_limb(spec, limb)
+        references.remove_limb(spec, limb)
     else:
-        require_removable(spec, limb)
+        references.require_removable(spec, limb)
         _shrink(spec, limb, 1.0 - amount)
 
 
@@ -338,28 +416,27 @@ def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
 
 def _resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
     """Scale a limb in size and strength, in place, with everything attached to it."""
-    for body in subtree(limb):
-        require_geometry(spec, body)
-        held = anchor(body)
+    for body in references.subtree(limb):
+        geometry.require_geometry(spec, body)
+        held = geometry.anchor(body)
         for geom in body.geoms:
-            resize_geom(geom, held, factor)
-        carry_outwards(body, held, factor)
+            geometry.resize_geom(geom, held, factor)
+        geometry.carry_outwards(body, held, factor)
         for joint in body.joints:
             _scale_resistance(joint, factor)
-    elements = elements_of(limb)
-    release_drawings(spec, elements)
+    elements = references.elements_of(limb)
+    references.release_drawings(spec, elements)
     for tendon in spec.tendons:
-        path = {*path_elements(tendon)}
-        if path.isdisjoint(elements) or not moves_only(spec, tendon, elements):
+        path = {*references.path_elements(tendon)}
+        if path.isdisjoint(elements) or not references.moves_only(spec, tendon, elements):
             continue
-        elements.add(key_of(tendon))
+        elements.add(references.key_of(tendon))
         _scale_resistance(tendon, factor)
         if path <= elements and _O.mjOBJ_JOINT not in {kind for kind, _ in path}:
-            tendon.range = tendon.range * factor
+            tendon.range *= factor
             # A negative length stands for the length in the reference pose.
-            lengths = np.array(tendon.springlength)
-            tendon.springlength = np.where(lengths > 0.0, lengths * factor, lengths)
-    for mention in references(spec, "actuator"):
+            tendon.springlength[tendon.springlength > 0.0] *= factor
+    for mention in references.references(spec, "actuator"):
         strong = mention.element[0] in (_O.mjOBJ_JOINT, _O.mjOBJ_TENDON)
         if strong and mention.element in elements:
             scale_strength(mention.holder, factor)
@@ -367,30 +444,26 @@ def _resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> No
 
 def _scale_resistance(element: Any, factor: float) -> None:
     """Scale the armature, damping, stiffness and friction of a joint or tendon."""
-    for field in ("armature", "damping", "stiffness", "frictionloss"):
+    for field in _RESISTANCE:
         setattr(element, field, getattr(element, field) * factor)
 
 
 def _add_segment(
-    spec: mujoco.MjSpec,
-    body: mujoco.MjsBody,
-    edit: Split | AddSegment,
-    place: np.ndarray,
-    amount: float,
+    spec: mujoco.MjSpec, body: Any, edit: Split | AddSegment, place: np.ndarray, amount: float
 ) -> mujoco.MjsBody:
     """Add a body without geoms at `place` of `body`, on a hinge like its own, with its motor."""
     for kind in ("body", "joint", "actuator"):
         require_free_name(spec, kind, edit.name)
-    own = next((j for j in body.joints if j.type == mujoco.mjtJoint.mjJNT_HINGE), None)
+    own = next((j for j in body.joints if j.type == _J.mjJNT_HINGE), None)
     axis = edit.axis if own is None or edit.axis is not None else own.axis
     if axis is None:
         raise MorphologyError(f"{body.name!r} has no hinge to take the axis from: give one.")
     part = body.add_body(name=edit.name, pos=place, gravcomp=body.gravcomp)
-    hinge = part.add_joint(name=edit.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+    hinge = part.add_joint(name=edit.name, type=_J.mjJNT_HINGE, axis=axis)
     for field in _HINGE_FIELDS if own is not None else ():
         setattr(hinge, field, getattr(own, field))
     strength = max(amount, _SMALLEST_PART)
-    set_limits(hinge, strength * edit.lower, strength * edit.upper)
+    geometry.set_limits(hinge, strength * edit.lower, strength * edit.upper)
     if edit.gear is not None:
-        add_motor(spec, edit.name, strength * edit.gear)
+        _add_motor(spec, edit.name, strength * edit.gear)
     return part

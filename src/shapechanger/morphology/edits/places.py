@@ -1,53 +1,161 @@
-"""Edits that put a body, a geom or a floor where a model has it, and set a total mass.
+"""Edits of shapes and places, and of the world: segments, geoms, origins, a floor.
 
-`Stretch` and similar edits keep a body in proportion. These change one element alone, so that any
+`Stretch` and `Radius` keep a body in proportion. The others change one element alone, so that any
 variant of a model that is written as a file can be written as edits.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Final
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import mujoco
 import numpy as np
 from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits import Edit, Positive, Vector, part_of_the_way
-from shapechanger.morphology.pose import robot_bodies
-from shapechanger.morphology.spec import (
-    compiled,
-    require_free_name,
-    select,
-)
-from shapechanger.morphology.spec.geometry import (
-    LONG,
-    axis_ends,
-    has_ends,
-    move_by,
-    orientation,
-    place_of,
-    reference_of,
-    require_geometry,
-    rotation,
-    same_density,
-    scale_mass,
-    set_ends,
-)
-from shapechanger.morphology.spec.references import key_of, release_drawings
+from shapechanger.morphology.edits import Edit, Positive, Ratio, Vector, part_of_the_way
+from shapechanger.morphology.spec import geometry, references, require_free_name, select
 
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.carried import Keyframes
 
-_J: Final = mujoco.mjtJoint
 _G: Final = mujoco.mjtGeom
+_J: Final = mujoco.mjtJoint
+_ROUND: Final = (_G.mjGEOM_SPHERE, *geometry.LONG)
 # Share of an axis that is vertical from which a slide raises its body.
 _VERTICAL: Final = 1.0 - 1e-6
 # MuJoCo's default friction of a geom: torsional and rolling, m.
 _TORSIONAL: Final = 0.005
 _ROLLING: Final = 0.0001
 _FLOOR_GRID_M: Final = 0.05
+
+
+class Stretch(Edit, frozen=True):
+    """Make segments longer or shorter at the same thickness, held at their joints.
+
+    Elements attached to a segment move outwards with it. Mass and inertia follow from the new
+    geometry at the same density. The length of a box or ellipsoid is its longest half-size, or the
+    one along the given axis.
+
+    Attributes:
+        body: Name or glob of the bodies.
+        factor: New length over old length, 0.01 to 100.
+        axis: Axis of the body to stretch along; None for all three, which keeps a limb straight.
+    """
+
+    body: str
+    factor: Ratio
+    axis: Literal["x", "y", "z"] | None = None
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Stretch every body that fits."""
+        factor = part_of_the_way(1.0, self.factor, self.amount)
+        axis = None if self.axis is None else "xyz".index(self.axis)
+        along = factor if axis is None else np.where(np.arange(3) == axis, factor, 1.0)
+        for body in _reshaped(spec, self.body, factor):
+            held = geometry.anchor(body)
+            for geom in body.geoms:
+                with geometry.same_density(geom):
+                    geometry.lengthen(geom, factor, axis)
+                    geometry.move_outwards(geom, held, along)
+            geometry.carry_outwards(body, held, along)
+
+
+class Radius(Edit, frozen=True):
+    """Make segments thicker or thinner at the same length; mass and inertia follow.
+
+    Attributes:
+        body: Name or glob of the bodies.
+        factor: New radius over old radius, 0.01 to 100. Of a box or ellipsoid the two smaller
+            half-sizes are scaled.
+    """
+
+    body: str
+    factor: Ratio
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Thicken every body that fits."""
+        factor = part_of_the_way(1.0, self.factor, self.amount)
+        for body in _reshaped(spec, self.body, factor):
+            for geom in body.geoms:
+                with geometry.same_density(geom):
+                    is_round = geom.type in _ROUND or geometry.has_ends(geom)
+                    thick = np.arange(3) == 0 if is_round else np.arange(3) != np.argmax(geom.size)
+                    geom.size[thick] *= factor
+
+
+def _reshaped(spec: mujoco.MjSpec, pattern: str, factor: float) -> Iterator[mujoco.MjsBody]:
+    """Yield the bodies that match, without their skins; none if the factor is 1."""
+    for body in select("body", pattern, spec.bodies[1:]):
+        geometry.require_geometry(spec, body)
+        if factor != 1.0:  # Avoid rounding if nothing moves.
+            references.release_drawings(spec, {references.key_of(body)})
+            yield body
+
+
+class PlaceGeom(Edit, frozen=True):
+    """Change the place, length and radius of one geom only; the rest of its body is unchanged.
+
+    Mass and inertia of its body follow at the same density.
+
+    Attributes:
+        geom: Name or glob of the geoms.
+        start: One end of the axis of a capsule or cylinder, in the frame of its body, m.
+        end: The other end.
+        middle: Middle of a geom of any shape, in the frame of its body, m; its axes keep their
+            directions.
+        radius: Radius of a sphere, capsule or cylinder, m.
+    """
+
+    geom: str
+    start: Vector | None = None
+    end: Vector | None = None
+    middle: Vector | None = None
+    radius: Positive | None = None
+
+    def check(self) -> None:
+        """Refuse one end alone, ends together with a middle, equal ends, and no change at all."""
+        one = self.start is not None or self.end is not None
+        both = self.start is not None and self.end is not None and self.start != self.end
+        if one and (not both or self.middle is not None):
+            raise MorphologyError(
+                f"A geom is placed by two different ends or by its middle, got {self}."
+            )
+        if not one and self.middle is None and self.radius is None:
+            raise MorphologyError(f"PlaceGeom takes two ends, a middle or a radius, got {self}.")
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change every geom that fits."""
+        for geom in select("geom", self.geom, spec.geoms):
+            if geom.parent.parent is not None:
+                geometry.require_geometry(spec, geom.parent)
+                references.release_drawings(spec, {references.key_of(geom.parent)})
+            with geometry.same_density(geom):
+                if self.start is not None:
+                    self._place_ends(geom)
+                if self.middle is not None:
+                    place, to = geometry.middle_of(geom), np.array(self.middle, float)
+                    geometry.move_by(geom, part_of_the_way(place, to, self.amount) - place)
+                if self.radius is not None:
+                    if geom.type not in _ROUND:
+                        raise MorphologyError(
+                            f"{geom.name!r} is no sphere, capsule or cylinder, so it has no radius."
+                        )
+                    geom.size[0] = part_of_the_way(geom.size[0], self.radius, self.amount)
+
+    def _place_ends(self, geom: mujoco.MjsGeom) -> None:
+        """Set both ends of the axis."""
+        old, new = geometry.axis_ends(geom), np.array([self.start, self.end], float)
+        if not len(old):
+            raise MorphologyError(f"{geom.name!r} is no capsule or cylinder, so it has no ends.")
+        # The ends of a geom that is given by its pose have no order: match the nearest.
+        here, turned = (np.linalg.norm(old - n, axis=1).sum() for n in (new, new[::-1]))
+        if not geometry.has_ends(geom) and here > turned:
+            old = old[::-1]
+        geom.size = [geom.size[0], 0.0, 0.0]
+        geometry.set_ends(geom, part_of_the_way(old, new, self.amount))
 
 
 class PlaceBody(Edit, frozen=True):
@@ -98,87 +206,19 @@ class StartHeight(Edit, frozen=True):
         """Raise or lower the trunks in every keyframe too, because robots start in one."""
         trunks = select("trunk", self.body, spec.worldbody.bodies)
         for joint in (joint for body in trunks for joint in body.joints):
-            axis = rotation(orientation(joint.parent)) @ joint.axis
+            axis = geometry.rotation(geometry.orientation(joint.parent)) @ joint.axis
             vertical = joint.type == _J.mjJNT_SLIDE and abs(axis[2]) > _VERTICAL * math.hypot(*axis)
             if joint.type == _J.mjJNT_FREE:
                 keyframes.change(joint.name, self._raised)
             elif vertical:
                 # At its reference the body is where the model puts it.
-                own = np.array([reference_of(joint)])
+                own = np.array([geometry.reference_of(joint)])
                 keyframes.change(joint.name, lambda old, own=own: old + self.amount * (own - old))
 
     def _raised(self, pose: np.ndarray) -> np.ndarray:
         """Return a position that begins with x, y and z, at the new height."""
-        pose = pose.copy()
-        pose[2] = part_of_the_way(float(pose[2]), self.to, self.amount)
-        return pose
-
-
-class PlaceGeom(Edit, frozen=True):
-    """Change the place, length and radius of one geom only; the rest of its body is unchanged.
-
-    Mass and inertia of its body follow at the same density.
-
-    Attributes:
-        geom: Name or glob of the geoms.
-        start: One end of the axis of a capsule or cylinder, in the frame of its body, m.
-        end: The other end.
-        middle: Middle of a geom of any shape, in the frame of its body, m; its axes keep their
-            directions.
-        radius: Radius of a sphere, capsule or cylinder, m.
-    """
-
-    geom: str
-    start: Vector | None = None
-    end: Vector | None = None
-    middle: Vector | None = None
-    radius: Positive | None = None
-
-    def check(self) -> None:
-        """Refuse one end alone, ends together with a middle, equal ends, and no change at all."""
-        if (self.start is None) != (self.end is None):
-            raise MorphologyError(f"An axis has a start and an end, got {self}.")
-        if self.start is not None and (self.middle is not None or self.start == self.end):
-            raise MorphologyError(
-                f"A geom is placed by two different ends or by its middle, got {self}."
-            )
-        if self.start is None and self.middle is None and self.radius is None:
-            raise MorphologyError(f"PlaceGeom takes two ends, a middle or a radius, got {self}.")
-
-    def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every geom that fits."""
-        for geom in select("geom", self.geom, spec.geoms):
-            if geom.parent.parent is not None:
-                require_geometry(spec, geom.parent)
-                release_drawings(spec, {key_of(geom.parent)})
-            with same_density(geom):
-                if self.start is not None:
-                    self._place_ends(geom)
-                if self.middle is not None:
-                    place = place_of(geom)
-                    to = np.array(self.middle, float)
-                    move_by(geom, part_of_the_way(place, to, self.amount) - place)
-                if self.radius is not None:
-                    if geom.type not in (_G.mjGEOM_SPHERE, *LONG):
-                        raise MorphologyError(
-                            f"{geom.name!r} is no sphere, capsule or cylinder, so it has no radius."
-                        )
-                    size = np.array(geom.size)
-                    size[0] = part_of_the_way(float(size[0]), self.radius, self.amount)
-                    geom.size = size
-
-    def _place_ends(self, geom: mujoco.MjsGeom) -> None:
-        """Set both ends of the axis."""
-        ends, new = axis_ends(geom), np.array([self.start, self.end], float)
-        if ends is None:
-            raise MorphologyError(f"{geom.name!r} is no capsule or cylinder, so it has no ends.")
-        old = np.array(ends)
-        # The ends of a geom that is given by its pose have no order: match the nearest.
-        here, turned = (np.linalg.norm(old - n, axis=1).sum() for n in (new, new[::-1]))
-        if not has_ends(geom) and here > turned:
-            old = old[::-1]
-        geom.size = [geom.size[0], 0.0, 0.0]
-        set_ends(geom, part_of_the_way(old, new, self.amount))
+        height = part_of_the_way(float(pose[2]), self.to, self.amount)
+        return np.concatenate([pose[:2], [height], pose[3:]])
 
 
 class AddFloor(Edit, frozen=True):
@@ -204,27 +244,3 @@ class AddFloor(Edit, frozen=True):
             contype=1,
             conaffinity=1,
         )
-
-
-class TotalMass(Edit, frozen=True):
-    """Scale all masses and inertias of the robot, so that it has this mass.
-
-    It acts on the robot as the edits before it have left it. Objects, which no actuator moves, keep
-    theirs.
-
-    Attributes:
-        to: Mass of the robot's bodies together, kg, at most a million.
-    """
-
-    to: Annotated[float, Meta(gt=0.0, le=1e6)]
-
-    def apply(self, spec: mujoco.MjSpec) -> None:
-        """Scale the mass of every body."""
-        # Only the compiler knows the volume of every shape.
-        model = compiled(spec)
-        robot = robot_bodies(model)
-        old = float(np.where(robot, model.body_mass, 0.0).sum())
-        names = {model.body(i).name for i in np.flatnonzero(robot)}
-        for body in spec.bodies[1:]:
-            if body.name in names:
-                scale_mass(body, part_of_the_way(old, self.to, self.amount) / old)

@@ -1,6 +1,6 @@
-"""Edits of one number: mass, density, gear, damping, stiffness, friction.
+"""Edits of numbers: mass, density, strength, resistance, friction, range, gravity.
 
-Each is given as a ratio to what it was (`scale`) or as a new value (`to`), never both. In
+Most are given as a ratio to what it was (`scale`) or as a new value (`to`), never both. In
 domain randomization, these are the operations `scale` and `abs`.
 """
 
@@ -16,17 +16,8 @@ from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits import Edit, Ratio, Vector, part_of_the_way, require_gear
-from shapechanger.morphology.spec import compiled, select
-from shapechanger.morphology.spec.geometry import (
-    LONG,
-    has_ends,
-    inertia_is_written_out,
-    require_geometry,
-    same_density,
-    scale_mass,
-    stretch_segment,
-)
-from shapechanger.morphology.spec.references import key_of, references, release_drawings
+from shapechanger.morphology.pose import robot_bodies
+from shapechanger.morphology.spec import compiled, geometry, references, select
 
 _D: Final = mujoco.mjtDisableBit
 _GAIN: Final = mujoco.mjtGain
@@ -36,7 +27,6 @@ _LINEAR: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE), (_BIAS.mjBIAS_NONE, 
 _LARGEST: Final = 1e6
 # Ten times the gravity at Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
 _LARGEST_GRAVITY: Final = 250.0
-_FRICTION_PLACES: Final = {"sliding": 0, "torsional": 1, "rolling": 2}
 
 
 class ValueEdit(Edit, frozen=True, tag=None):
@@ -81,7 +71,29 @@ class Mass(ValueEdit, frozen=True):
             old = 1.0 if whole is None else float(whole.body(body.name).mass[0])
             if old <= 0.0:
                 raise MorphologyError(f"{body.name!r} has no mass, so none can be set.")
-            scale_mass(body, self.changed(old) / old)
+            geometry.scale_mass(body, self.changed(old) / old)
+
+
+class TotalMass(Edit, frozen=True):
+    """Scale all masses and inertias of the robot, so that it has this mass.
+
+    It acts on the robot as the edits before it have left it. Objects, which no actuator moves, keep
+    theirs.
+
+    Attributes:
+        to: Mass of the robot's bodies together, kg, at most a million.
+    """
+
+    to: Annotated[float, Meta(gt=0.0, le=_LARGEST)]
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Scale the mass of every body."""
+        model = compiled(spec)
+        robot = robot_bodies(model)
+        old = float(np.where(robot, model.body_mass, 0.0).sum())
+        new = part_of_the_way(old, self.to, self.amount)
+        for i in np.flatnonzero(robot).tolist():
+            geometry.scale_mass(spec.body(model.body(i).name), new / old)
 
 
 class Density(ValueEdit, frozen=True):
@@ -90,14 +102,11 @@ class Density(ValueEdit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every body that fits."""
         for body in select("body", self.element, spec.bodies[1:]):
-            written = [geom.name for geom in body.geoms if not math.isnan(geom.mass)]
-            if inertia_is_written_out(spec, body) or written:
-                what = (
-                    f"{written[0]!r} has its mass" if written else f"{body.name!r} has its inertia"
-                )
+            written = any(not math.isnan(geom.mass) for geom in body.geoms)
+            if written or geometry.inertia_is_written_out(spec, body):
                 raise MorphologyError(
-                    f"{what} written out, so its density has no effect: change the mass of "
-                    f"{body.name!r} instead."
+                    f"{body.name!r} has a mass or inertia written out, so its density has no "
+                    "effect: change its mass instead."
                 )
             for geom in body.geoms:
                 geom.density = self.changed(geom.density)
@@ -123,22 +132,21 @@ class Gear(ValueEdit, frozen=True):
         """Change every actuator that fits."""
         factors: dict[str, float] = {}
         for actuator in select("actuator", self.element, spec.actuators):
-            if not _is_motor(actuator):
-                if self.scale is None:
-                    raise MorphologyError(
-                        f"{actuator.name!r} is no motor, so its gear is not its strength: give a "
-                        "scale instead of a value."
-                    )
-                factors[actuator.name] = self.changed(1.0)
-                scale_strength(actuator, factors[actuator.name])
-                continue
             gear = np.array(actuator.gear)
             strongest = float(gear[np.argmax(np.abs(gear))])
-            if not strongest:
-                raise MorphologyError(f"{actuator.name!r} has a gear of zero, so none can be set.")
-            new = self.changed(strongest)
-            factors[actuator.name] = new / strongest
-            actuator.gear = np.where(gear == strongest, new, gear * (new / strongest))
+            if _is_motor(actuator) and strongest:
+                new = self.changed(strongest)
+                factor = new / strongest
+                actuator.gear = np.where(gear == strongest, new, gear * factor)
+            elif not strongest or self.scale is None:
+                raise MorphologyError(
+                    f"{actuator.name!r} is no motor or has a gear of zero, so no gear can be set: "
+                    "give a servo a scale instead."
+                )
+            else:
+                factor = self.changed(1.0)
+                scale_strength(actuator, factor)
+            factors[actuator.name] = factor
         _scale_clamps(spec, factors)
 
 
@@ -154,24 +162,22 @@ def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
     for a servo the gains, the bias and the force range are scaled instead.
     """
     if _is_motor(actuator):
-        actuator.gear = actuator.gear * factor
+        actuator.gear *= factor
         return
-    gain, bias = np.array(actuator.gainprm), np.array(actuator.biasprm)
     if actuator.gaintype == _GAIN.mjGAIN_MUSCLE and actuator.biastype == _BIAS.mjBIAS_MUSCLE:
         # The peak force, or the values that it is derived from if it is negative.
-        for force in (gain[2:4], bias[2:4]):
+        for force in (actuator.gainprm[2:4], actuator.biasprm[2:4]):
             force[force > 0.0] *= factor
     elif actuator.gaintype in _LINEAR[0] and actuator.biastype in _LINEAR[1]:
         # Constant, length and velocity terms.
-        gain[:3] *= factor
-        bias[:3] *= factor
+        actuator.gainprm[:3] *= factor
+        actuator.biasprm[:3] *= factor
     else:
         raise MorphologyError(
             f"{actuator.name!r} is an actuator whose gains have no common scale, so its strength "
             "cannot be scaled: write new gains into the model instead."
         )
-    actuator.gainprm, actuator.biasprm = gain, bias
-    actuator.forcerange = actuator.forcerange * factor
+    actuator.forcerange *= factor
 
 
 def _scale_clamps(spec: mujoco.MjSpec, factors: Mapping[str, float]) -> None:
@@ -180,45 +186,41 @@ def _scale_clamps(spec: mujoco.MjSpec, factors: Mapping[str, float]) -> None:
     Without it, a stronger motor of a joint with `actuatorfrcrange` would have no effect. The
     factors are new forces over old ones, by the names of actuators.
     """
-    driven = [(each.element, each.holder.name) for each in references(spec, "actuator")]
+    driven = references.references(spec, "actuator")
     for element in (*spec.joints, *spec.tendons):
-        scales = {factors.get(name, 1.0) for target, name in driven if target == key_of(element)}
-        if len(scales) == 1 and np.any(element.actfrcrange):
-            element.actfrcrange = element.actfrcrange * abs(scales.pop())
+        own = references.key_of(element)
+        scales = {factors.get(each.holder.name, 1.0) for each in driven if each.element == own}
+        if len(scales) == 1:
+            element.actfrcrange *= abs(scales.pop())
 
 
-class Damping(ValueEdit, frozen=True):
+class _Resistance(ValueEdit, frozen=True, tag=None):
+    """Base class of edits of a joint's linear coefficient, and of higher ones by a scale."""
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Change every joint that fits."""
+        field = type(self).__name__.lower()
+        for joint in select("joint", self.element, spec.joints):
+            if all(number > 0.0 for number in joint.springdamper):
+                raise MorphologyError(
+                    f"{joint.name!r} takes its {field} from its springdamper, which would swallow "
+                    "the change: write stiffness and damping out in the model."
+                )
+            numbers = getattr(joint, field)
+            for i in range(1 if self.scale is None else len(numbers)):
+                numbers[i] = self.changed(float(numbers[i]))
+
+
+class Damping(_Resistance, frozen=True):
     """Change the damping of joints: N·m·s/rad of a hinge, N·s/m of a slide."""
 
     needs: ClassVar = (_D.mjDSBL_DAMPER, "dampers")
 
-    def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every joint that fits."""
-        _change_resistance(spec, self, "damping")
 
-
-class Stiffness(ValueEdit, frozen=True):
+class Stiffness(_Resistance, frozen=True):
     """Change the stiffness of joints: N·m/rad of a hinge, N/m of a slide."""
 
     needs: ClassVar = (_D.mjDSBL_SPRING, "springs")
-
-    def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every joint that fits."""
-        _change_resistance(spec, self, "stiffness")
-
-
-def _change_resistance(spec: mujoco.MjSpec, edit: ValueEdit, field: str) -> None:
-    """Change the linear coefficient of joints, and higher ones by a scale."""
-    for joint in select("joint", edit.element, spec.joints):
-        if all(number > 0.0 for number in joint.springdamper):
-            raise MorphologyError(
-                f"{joint.name!r} takes its {field} from its springdamper, which would swallow the "
-                "change: write stiffness and damping out in the model."
-            )
-        numbers = np.array(getattr(joint, field))
-        count = 1 if edit.scale is None else len(numbers)
-        numbers[:count] = [edit.changed(float(number)) for number in numbers[:count]]
-        setattr(joint, field, numbers)
 
 
 class Friction(ValueEdit, frozen=True):
@@ -246,63 +248,50 @@ class Friction(ValueEdit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every geom that fits."""
-        place = _FRICTION_PLACES[self.component]
+        place = ("sliding", "torsional", "rolling").index(self.component)
         for geom in select("geom", self.element, spec.geoms):
-            friction = np.array(geom.friction)
-            friction[place] = self.changed(float(friction[place]))
-            geom.friction = friction
+            geom.friction[place] = self.changed(float(geom.friction[place]))
 
 
-class Stretch(Edit, frozen=True):
-    """Make segments longer or shorter at the same thickness, held at their joints.
+class JointRange(Edit, frozen=True):
+    """Change how far hinges and slides move; a joint without limits becomes limited.
 
-    Elements attached to a segment move outwards with it. Mass and inertia follow from the new
-    geometry at the same density. The length of a box or ellipsoid is its longest half-size, or the
-    one along the given axis.
+    A slide without limits needs both. At a smaller amount, its limits are farther apart.
 
     Attributes:
-        body: Name or glob of the bodies.
-        factor: New length over old length, 0.01 to 100.
-        axis: Axis of the body to stretch along; None for all three, which keeps a limb straight.
+        joint: Name or glob of the joints.
+        lower: New lower limit, rad or m; None keeps the old one.
+        upper: New upper limit, rad or m; None keeps the old one.
     """
 
-    body: str
-    factor: Ratio
-    axis: Literal["x", "y", "z"] | None = None
+    needs: ClassVar = (_D.mjDSBL_LIMIT, "limits of joints")
+    joint: str
+    lower: float | None = None
+    upper: float | None = None
+
+    def check(self) -> None:
+        """Refuse an empty range, or none at all."""
+        if self.lower is None and self.upper is None:
+            raise MorphologyError(f"A joint range needs a lower or upper limit, got {self}.")
+        if self.lower is not None and self.upper is not None and not self.lower < self.upper:
+            raise MorphologyError(f"The lower limit must be below the upper one, got {self}.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Stretch every body that fits."""
-        factor = part_of_the_way(1.0, self.factor, self.amount)
-        for body in select("body", self.body, spec.bodies[1:]):
-            require_geometry(spec, body)
-            stretch_segment(spec, body, factor, self.axis)
-
-
-class Radius(Edit, frozen=True):
-    """Make segments thicker or thinner at the same length; mass and inertia follow.
-
-    Attributes:
-        body: Name or glob of the bodies.
-        factor: New radius over old radius, 0.01 to 100. Of a box or ellipsoid the two smaller
-            half-sizes are scaled.
-    """
-
-    body: str
-    factor: Ratio
-
-    def apply(self, spec: mujoco.MjSpec) -> None:
-        """Thicken every body that fits."""
-        factor = part_of_the_way(1.0, self.factor, self.amount)
-        for body in select("body", self.body, spec.bodies[1:]):
-            require_geometry(spec, body)
-            release_drawings(spec, {key_of(body)})
-            for geom in body.geoms:
-                with same_density(geom):
-                    size = np.array(geom.size)
-                    is_round = geom.type in (*LONG, mujoco.mjtGeom.mjGEOM_SPHERE) or has_ends(geom)
-                    thick = np.arange(3) == 0 if is_round else np.arange(3) != np.argmax(size)
-                    size[thick] *= factor
-                    geom.size = size
+        """Change every joint that fits."""
+        for joint in select("joint", self.joint, spec.joints):
+            if (old := geometry.limits(joint)) is None:
+                if self.lower is None or self.upper is None:
+                    raise MorphologyError(f"{joint.name!r} slides without limits: give both.")
+                # The smaller the amount, the wider.
+                reach = (self.upper - self.lower) / self.amount
+                old = self.lower - reach, self.upper + reach
+            lower, upper = (
+                o if n is None else part_of_the_way(o, n, self.amount)
+                for o, n in zip(old, (self.lower, self.upper), strict=True)
+            )
+            if not lower < upper:
+                raise MorphologyError(f"The range of {joint.name!r} would be {lower} to {upper}.")
+            geometry.set_limits(joint, lower, upper)
 
 
 class Gravity(Edit, frozen=True):

@@ -17,13 +17,14 @@ import numpy as np
 from shapechanger.errors import MorphologyError, UnknownName
 from shapechanger.morphology.spec.geometry import (
     UPRIGHT,
-    Array,
     has_ends,
     orientation,
+    points_of,
     product,
     rotation,
     scale_mass,
     set_orientation,
+    set_points,
 )
 from shapechanger.morphology.spec.references import kind_of
 
@@ -45,8 +46,8 @@ def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
         UnknownName: If none matches.
     """
     candidates = list(elements)
-    exact = [element for element in candidates if element.name == pattern]
-    found = exact or [e for e in candidates if fnmatch.fnmatchcase(e.name, pattern)]
+    found = [element for element in candidates if element.name == pattern]
+    found = found or [e for e in candidates if fnmatch.fnmatchcase(e.name, pattern)]
     if not found:
         raise UnknownName(kind, pattern, [element.name for element in candidates])
     return found
@@ -59,8 +60,7 @@ def select_limbs(spec: mujoco.MjSpec, pattern: str, change: str) -> Iterator[muj
     carries the whole robot.
     """
     for name in [body.name for body in select("body", pattern, spec.bodies[1:])]:
-        body = spec.body(name)
-        if body is None:
+        if (body := spec.body(name)) is None:
             continue
         if body.parent.parent is None:
             raise MorphologyError(
@@ -187,38 +187,30 @@ def resolve_frames(spec: mujoco.MjSpec) -> None:
         return
     points = (*spec.geoms, *spec.sites, *spec.cameras, *spec.joints, *spec.lights)
     for element in (*spec.bodies[1:], *points):
-        frames: list[mujoco.MjsFrame] = []
-        frame: Any = element.frame
-        while frame is not None:
-            frames.append(frame)
-            frame = frame.frame
-        if frames:
-            turn, shift = orientation(frames[0]), np.array(frames[0].pos)
-            for around in frames[1:]:
-                outer = orientation(around)
-                turn, shift = product(outer, turn), around.pos + rotation(outer) @ shift
+        if (frame := element.frame) is not None:
+            turn, shift = orientation(frame), np.array(frame.pos)
+            while (frame := frame.frame) is not None:
+                outer = orientation(frame)
+                turn, shift = product(outer, turn), frame.pos + rotation(outer) @ shift
             _resolve(element, turn, shift)
     for frame in spec.frames:
         frame.pos = np.zeros(3)
         set_orientation(frame, UPRIGHT)
 
 
-def _resolve(element: Any, turn: Array, shift: Array) -> None:
-    """Express the pose of an element relative to its body."""
-    matrix = rotation(turn)
-    if has_ends(element):
-        first, last = element.fromto.reshape(2, 3)
-        if element.type != mujoco.mjtGeom.mjGEOM_BOX:
-            element.fromto = np.concatenate([shift + matrix @ first, shift + matrix @ last])
-            return
+def _resolve(element: Any, turn: np.ndarray, shift: np.ndarray) -> None:
+    """Express the pose of an element relative to its body, from that relative to a frame."""
+    if has_ends(element) and element.type == mujoco.mjtGeom.mjGEOM_BOX:
         # The turn of a box about its axis follows from the frame: write its pose, as MuJoCo does.
+        first, last = points_of(element)
         length, upwards = float(np.linalg.norm(first - last)), np.empty(4)
         mujoco.mju_quatZ2Vec(upwards, (first - last) / length)
         element.pos, element.quat = 0.5 * (first + last), upwards
         element.size = [element.size[0], element.size[0], 0.5 * length]
         element.fromto = np.full(6, np.nan)
-    element.pos = shift + matrix @ element.pos
-    if hasattr(element, "quat"):
+    matrix = rotation(turn)
+    set_points(element, np.array([shift + matrix @ point for point in points_of(element)]))
+    if hasattr(element, "quat") and not has_ends(element):
         set_orientation(element, product(turn, orientation(element)))
     for direction in ("axis", "dir"):
         if hasattr(element, direction):

@@ -17,16 +17,17 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
+from shapechanger.morphology.pose import CLOSED, close, equality_rows
 from shapechanger.morphology.spec import compiled, unique_namer
 from shapechanger.morphology.spec.geometry import (
     UPRIGHT,
     Array,
+    as_written,
     displace,
     inverse,
     orientation,
     product,
     reference_of,
-    set_reference,
 )
 from shapechanger.morphology.spec.references import COUPLINGS, MARK, OF_JOINTS, PINS, Element
 
@@ -37,21 +38,14 @@ _W: Final = mujoco.mjtWrap
 _D: Final = mujoco.mjtDisableBit
 _FREE, _BALL = int(_J.mjJNT_FREE), int(_J.mjJNT_BALL)
 _WITHOUT: Final = _D.mjDSBL_CONTACT | _D.mjDSBL_LIMIT | _D.mjDSBL_FRICTIONLOSS
-_UNLIMITED: Final = np.array([[-np.inf], [np.inf]])
+_MOST_STEPS: Final = 200
 _FIELDS: Final = ("qpos", "qvel", "act", "ctrl", "mpos", "mquat")
 # A tendon that is longer than its limit by less is within it, m or rad.
 _WITHIN: Final = 1e-6
-# Residual of an equality that is closed, m or rad; above the rounding of a compiled model.
-_CLOSED: Final = 1e-9
 # Points of a closed loop coincide within this, m.
 _TOGETHER: Final = 1e-8
 # A joint that moves less has not moved, rad or m.
 _STILL: Final = 1e-12
-# A longer step, rad or m, can jump to another way to assemble the loop.
-_LONGEST_STEP: Final = 0.2
-_MOST_STEPS: Final = 200
-# Singular values below this share of the largest belong to motions that do not close a loop.
-_SINGULAR: Final = 1e-6
 
 
 @contextmanager
@@ -69,8 +63,9 @@ def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
     tendons, torn = _tendons(model), set[Element]()
     if loops:
         _mark_pins(spec, model)
-        residuals = _residuals(spec, _posed(compiled(spec)))
-        torn = {key for key, residual in residuals.items() if residual > _CLOSED}
+        marked = compiled(spec)
+        residuals = _residuals(spec, marked, _posed(marked))
+        torn = {key for key, residual in residuals.items() if residual > CLOSED}
     yield keyframes
     if any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities):
         _unmark_pins(spec, _close_loops(spec, compiled(spec), torn, keyframes))
@@ -248,7 +243,7 @@ def _close_loops(
     mujoco.mj_fwdPosition(model, data)
     lengths = np.array(data.ten_length)
     if not _solve(model, data):
-        (_, name), gap = max(_residuals(spec, data).items(), key=lambda item: item[1])
+        (_, name), gap = max(_residuals(spec, model, data).items(), key=lambda item: item[1])
         equality = next(e for e in spec.equalities if e.name1 == name)
         names = [equality.name1, equality.name2]
         if name.startswith(MARK):
@@ -273,7 +268,7 @@ def _close_loops(
         elif joint.type != _J.mjJNT_FREE and abs(by) > _STILL:
             moved = True
             displace(joint, by)
-            set_reference(joint, reference_of(joint) + by)
+            joint.ref = as_written(joint, reference_of(joint) + by)
             changes[_O.mjOBJ_JOINT, joint.name] = by
     if moved:
         longer = (data.ten_length - lengths).tolist()
@@ -326,12 +321,13 @@ def _keys(spec: mujoco.MjSpec) -> list[Element]:
     return [(COUPLINGS.get(e.type, e.objtype), e.name1) for e in spec.equalities]
 
 
-def _residuals(spec: mujoco.MjSpec, data: mujoco.MjData) -> dict[Element, float]:
+def _residuals(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData
+) -> dict[Element, float]:
     """Return by how much each active equality is open, m or rad."""
     found, keys = dict[Element, float](), _keys(spec)
-    for row in range(data.ne):
-        key = keys[int(data.efc_id[row])]
-        found[key] = max(found.get(key, 0.0), float(abs(data.efc_pos[row])))
+    for row, gap in zip(*equality_rows(model, data)[:2], strict=True):
+        found[keys[row]] = max(found.get(keys[row], 0.0), float(abs(gap)))
     return found
 
 
@@ -343,26 +339,7 @@ def _solve(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     measured = (model.jnt_limited != 0) | (model.jnt_stiffness != 0.0)
     measured |= np.isin(np.arange(model.njnt), driven)
     still = (kinds == _FREE) | ((kinds == _BALL) & measured)
-    scalar = np.flatnonzero(kinds > _BALL)
-    places, dofs = model.jnt_qposadr[scalar], model.jnt_dofadr[scalar]
-    low, high = np.where(model.jnt_limited[scalar], model.jnt_range[scalar].T, _UNLIMITED)
-    low, high = np.minimum(low, model.qpos0[places]), np.maximum(high, model.qpos0[places])
-    at_limit = np.zeros(model.nv, bool)
-    for _ in range(_MOST_STEPS):
-        residual = data.efc_pos[: data.ne]
-        if not residual.size or np.abs(residual).max() <= _CLOSED:
-            return True
-        jacobian = data.efc_J.reshape(-1, model.nv)[: data.ne]
-        step, turning = np.zeros(model.nv), ~still[model.dof_jntid] & ~at_limit
-        step[turning] = -np.linalg.pinv(jacobian[:, turning], _SINGULAR) @ residual
-        step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max(initial=0.0)), _LONGEST_STEP))
-        mujoco.mj_integratePos(model, data.qpos, step, 1.0)
-        clipped = np.clip(data.qpos[places], low, high)
-        # A joint at its limit is left out of the next step, which the others must make.
-        at_limit[dofs] = clipped != data.qpos[places]
-        data.qpos[places] = clipped
-        mujoco.mj_fwdPosition(model, data)
-    return False
+    return close(model, data, ~still[model.dof_jntid], _MOST_STEPS) <= CLOSED
 
 
 def _shift_coupling(equality: mujoco.MjsEquality, changes: dict[Element, float]) -> None:

@@ -15,18 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.spec.references import key_of, release_drawings
 
 Array = NDArray[np.float64]
-Point = mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera | mujoco.MjsLight
 _G: Final = mujoco.mjtGeom
 _J: Final = mujoco.mjtJoint
+_L: Final = mujoco.mjtLimited
 LONG: Final = (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER)
 UPRIGHT: Final = np.array([1.0, 0.0, 0.0, 0.0])
 _QUAT: Final = mujoco.mjtOrientation.mjORIENTATION_QUAT
 # The method needs any specification, even an empty one.
 _RESOLVER: Final = mujoco.MjSpec()
-_AXES: Final = {"x": 0, "y": 1, "z": 2}
 # A joint without limits turns all the way round; a slide without limits has no such number.
 _FULL_TURN: Final = (-math.pi, math.pi)
 # Cosine above which a geom lies along an axis; the pole of the inverted pendulum leans by 1 mm on
@@ -91,14 +89,37 @@ def has_ends(element: Any) -> bool:
     return shaped and not math.isnan(element.fromto[0])
 
 
-def axis_ends(geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
-    """Return both ends of the axis of a capsule or cylinder; None for other shapes."""
+def points_of(element: Any) -> Array:
+    """Return the middle of an element, shape (1, 3), or the ends that it is given by, (2, 3)."""
+    return np.array(element.fromto if has_ends(element) else element.pos).reshape(-1, 3)
+
+
+def middle_of(element: Any) -> Array:
+    """Return the middle of a geom, site, camera or light."""
+    return points_of(element).mean(axis=0)
+
+
+def move_by(element: Any, shift: Array) -> None:
+    """Move a geom, site, camera or light within its body."""
+    set_points(element, points_of(element) + shift)
+
+
+def set_points(element: Any, points: Array) -> None:
+    """Move an element to other points, as many as `points_of` returns."""
+    if has_ends(element):
+        element.fromto = points.ravel()
+    else:
+        element.pos = points[0]
+
+
+def axis_ends(geom: mujoco.MjsGeom) -> Array:
+    """Return both ends of the axis of a capsule or cylinder, (2, 3); none for other shapes."""
     if geom.type not in LONG:
-        return None
+        return np.empty((0, 3))
     if has_ends(geom):
-        return np.array(geom.fromto[:3]), np.array(geom.fromto[3:])
+        return points_of(geom)
     half = rotation(orientation(geom))[:, 2] * geom.size[1]
-    return geom.pos - half, geom.pos + half
+    return np.array([geom.pos - half, geom.pos + half])
 
 
 def set_ends(geom: mujoco.MjsGeom, ends: Array) -> None:
@@ -106,21 +127,6 @@ def set_ends(geom: mujoco.MjsGeom, ends: Array) -> None:
     geom.pos = np.zeros(3)
     set_orientation(geom, UPRIGHT)
     geom.fromto = ends.ravel()
-
-
-def place_of(element: Any) -> Array:
-    """Return the middle of a geom, site, camera or light."""
-    if has_ends(element):
-        return np.array(element.fromto.reshape(2, 3).mean(axis=0))
-    return np.array(element.pos)
-
-
-def move_by(element: Any, shift: Array) -> None:
-    """Move a geom, site, camera or light within its body."""
-    if has_ends(element):
-        element.fromto = element.fromto + np.tile(shift, 2)
-    else:
-        element.pos = element.pos + shift
 
 
 def volume(geom: mujoco.MjsGeom) -> float:
@@ -137,7 +143,7 @@ def volume(geom: mujoco.MjsGeom) -> float:
             return 8.0 * a * b * c
         case _:
             ends = axis_ends(geom)
-            length = float(np.linalg.norm(ends[1] - ends[0])) if ends else 0.0
+            length = float(np.linalg.norm(ends[1] - ends[0])) if len(ends) else 0.0
             caps = 4.0 / 3.0 * math.pi * a**3 if geom.type == _G.mjGEOM_CAPSULE else 0.0
             return math.pi * a**2 * length + caps
 
@@ -161,8 +167,8 @@ def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
     """Scale a body's mass and inertia, in any notation."""
     if body.explicitinertial:
         body.mass *= factor
-        body.inertia = body.inertia * factor
-        body.fullinertia = body.fullinertia * factor
+        body.inertia *= factor
+        body.fullinertia *= factor
     for geom in body.geoms:
         scale_geom_mass(geom, factor)
 
@@ -170,8 +176,8 @@ def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
 def resize_geom(geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
     """Scale a geom in every direction about the point `held`."""
     with same_density(geom):
-        geom.size = geom.size * factor
-        _move_outwards(geom, held, factor)
+        geom.size *= factor
+        move_outwards(geom, held, factor)
 
 
 # --- Segments ----------------------------------------------------------------------------------
@@ -191,7 +197,7 @@ def held_at(body: mujoco.MjsBody) -> Array:
 def far_end(body: mujoco.MjsBody) -> Array:
     """Return the point of a segment's axis farthest from its anchor; refuse one without an axis."""
     held = anchor(body)
-    ends = [end for geom in body.geoms for end in axis_ends(geom) or ()]
+    ends = [end for geom in body.geoms for end in axis_ends(geom)]
     if not ends:
         raise MorphologyError(f"{body.name!r} has no capsule or cylinder, so it has no far end.")
     return max(ends, key=lambda end: float(np.linalg.norm(end - held)))
@@ -218,82 +224,61 @@ def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
             )
 
 
-def stretched(point: Array, held: Array, factor: float, axis: str | None = None) -> Array:
-    """Return a point of a segment that is `factor` times as long; the point `held` stays."""
-    scale = np.full(3, factor)
-    if axis is not None:
-        scale = np.ones(3)
-        scale[_AXES[axis]] = factor
-    return held + scale * (point - held)
+def stretched(points: Array, held: Array, factor: float | Array) -> Array:
+    """Return points of a segment that is `factor` times as long; the point `held` stays.
 
-
-def _move_outwards(element: Any, held: Array, factor: float, axis: str | None = None) -> None:
-    """Move an element, or its ends, as its segment is stretched."""
-    if has_ends(element):
-        ends = [stretched(end, held, factor, axis) for end in element.fromto.reshape(2, 3)]
-        element.fromto = np.concatenate(ends)
-    else:
-        element.pos = stretched(element.pos, held, factor, axis)
-
-
-def stretch_segment(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, factor: float, axis: str | None = None
-) -> None:
-    """Make a segment `factor` times as long, at the same thickness, held at its anchor.
-
-    It is stretched along "x", "y" or "z" of its body, or along all three; what is attached to it
-    moves outwards with it. A geom that lies oblique to the axis is refused.
+    The factor may be one for each axis of the body.
     """
-    if factor == 1.0:
-        return  # Avoid rounding if nothing moves.
-    release_drawings(spec, {key_of(body)})
-    held = anchor(body)
-    for geom in body.geoms:
-        with same_density(geom):
-            if not has_ends(geom):
-                _lengthen(geom, factor, axis)
-            _move_outwards(geom, held, factor, axis)
-    carry_outwards(body, held, factor, axis)
+    return held + factor * (points - held)
 
 
-def _lengthen(geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
-    """Scale the long half-size of a geom that is given by position and size."""
-    if geom.type == _G.mjGEOM_SPHERE:
+def move_outwards(element: Any, held: Array, factor: float | Array) -> None:
+    """Move an element, or its ends, as its segment is stretched."""
+    set_points(element, stretched(points_of(element), held, factor))
+
+
+def lengthen(geom: mujoco.MjsGeom, factor: float, axis: int | None) -> None:
+    """Scale the long half-size of a geom that is given by position and size.
+
+    It is the one along an axis of the body, if given; an oblique geom is refused.
+    """
+    if geom.type == _G.mjGEOM_SPHERE or has_ends(geom):
         return  # A sphere has no length.
-    size = np.array(geom.size)
-    place, direction = (1, 2) if geom.type in LONG else (int(np.argmax(size)),) * 2
+    place, direction = (1, 2) if geom.type in LONG else (int(np.argmax(geom.size)),) * 2
     if axis is not None:
         # How much each axis of the geom lies along that of the body.
-        along = np.abs(rotation(orientation(geom))[_AXES[axis]])
+        along = np.abs(rotation(orientation(geom))[axis])
         if geom.type not in LONG:
             place = direction = int(np.argmax(along))
         if along[direction] < 1.0 - _ALONG:
             return  # It lies across the axis.
         if along[direction] < _ALONG:
             raise MorphologyError(
-                f"{geom.name!r} lies oblique to the axis {axis!r}: stretch it along all axes "
-                "instead."
+                f"{geom.name!r} lies oblique to the axis: stretch it along all axes instead."
             )
-    size[place] *= factor
-    geom.size = size
+    geom.size[place] *= factor
 
 
-def carry_outwards(
-    body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
-) -> None:
+def carry_outwards(body: mujoco.MjsBody, held: Array, factor: float | Array) -> None:
     """Move the elements on a stretched segment: joints, sites, cameras, lights and bodies."""
     modes = mujoco.mjtCamLight
     following = (modes.mjCAMLIGHT_TRACK, modes.mjCAMLIGHT_TRACKCOM)
     # Cameras and lights that follow a body do so at a distance.
     mounted = [seen for seen in (*body.cameras, *body.lights) if seen.mode not in following]
     for element in (*body.joints, *body.sites, *mounted):
-        _move_outwards(element, held, factor, axis)
+        move_outwards(element, held, factor)
     for child in body.bodies:
         held_there = held_at(child)
-        child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
+        child.pos += stretched(held_there, held, factor) - held_there
 
 
 # --- Joints ------------------------------------------------------------------------------------
+
+
+def is_limited(element: mujoco.MjsJoint | mujoco.MjsTendon) -> bool:
+    """Return whether a joint or tendon has limits."""
+    automatic = element.limited == _L.mjLIMITED_AUTO and element.range[0] < element.range[1]
+    return automatic or element.limited == _L.mjLIMITED_TRUE
 
 
 def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
@@ -303,19 +288,16 @@ def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
     """
     if joint.type not in (_J.mjJNT_HINGE, _J.mjJNT_SLIDE):
         raise MorphologyError(f"{joint.name!r} is neither a hinge nor a slide, so it has no range.")
-    lower, upper = (float(x) for x in joint.range)
-    automatic = joint.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
-    if joint.limited != mujoco.mjtLimited.mjLIMITED_TRUE and not automatic:
+    if not is_limited(joint):
         return None if joint.type == _J.mjJNT_SLIDE else _FULL_TURN
-    if _in_degrees(joint):
-        return math.radians(lower), math.radians(upper)
-    return lower, upper
+    lower, upper = np.deg2rad(joint.range) if _in_degrees(joint) else joint.range
+    return float(lower), float(upper)
 
 
 def set_limits(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
     """Limit the range of a hinge or slide, rad or m."""
-    joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-    joint.range = [_as_written(joint, lower), _as_written(joint, upper)]
+    joint.limited = _L.mjLIMITED_TRUE
+    joint.range = [as_written(joint, position) for position in (lower, upper)]
 
 
 def reference_of(joint: mujoco.MjsJoint) -> float:
@@ -323,16 +305,11 @@ def reference_of(joint: mujoco.MjsJoint) -> float:
     return math.radians(joint.ref) if _in_degrees(joint) else float(joint.ref)
 
 
-def set_reference(joint: mujoco.MjsJoint, position: float) -> None:
-    """Set the position of a hinge or slide in the model's own pose, rad or m; the pose stays."""
-    joint.ref = _as_written(joint, position)
-
-
 def _in_degrees(joint: mujoco.MjsJoint) -> bool:
     return bool(joint.compiler.degree) and joint.type == _J.mjJNT_HINGE
 
 
-def _as_written(joint: mujoco.MjsJoint, position: float) -> float:
+def as_written(joint: mujoco.MjsJoint, position: float) -> float:
     """Return a position, rad or m, in the unit of the model.
 
     MuJoCo converts degrees to exactly this angle if possible, as for every angle that was written
@@ -384,13 +361,17 @@ class Plane:
     Attributes:
         along: From the anchor of the segment to its far end, in the body's frame, shape (3,), m.
         place: Where it crosses the axis of the segment, in the body's frame, shape (3,), m.
+        children: Bodies that are attached farther out than the plane.
+        points: Sites, cameras and lights of the segment farther out.
     """
 
     def __init__(self, body: mujoco.MjsBody, part: float) -> None:
-        self._body, self._part = body, part
-        self._held = anchor(body)
+        self._part, self._held = part, anchor(body)
         self.along = far_end(body) - self._held
         self.place = self._held + part * self.along
+        points = (*body.sites, *body.cameras, *body.lights)
+        self.children = [child for child in body.bodies if self._is_beyond(held_at(child))]
+        self.points = [point for point in points if self._is_beyond(middle_of(point))]
 
     def _share(self, point: Array) -> float:
         """Return the position of a point along the segment as a share of its length."""
@@ -399,28 +380,18 @@ class Plane:
     def _is_beyond(self, point: Array) -> bool:
         return self._share(point) > self._part + _SAME
 
-    def is_at_end(self, point: Point) -> bool:
+    def is_at_end(self, point: Any) -> bool:
         """Return whether a point of the segment is at its far end or past it."""
-        return self._share(place_of(point)) > 1.0 - _SAME
-
-    def children_beyond(self) -> list[mujoco.MjsBody]:
-        """Return the bodies that are attached farther out than the plane."""
-        return [c for c in self._body.bodies if self._is_beyond(held_at(c))]
-
-    def points_beyond(self) -> list[Point]:
-        """Return the sites, cameras and lights of the segment farther out than the plane."""
-        points = (*self._body.sites, *self._body.cameras, *self._body.lights)
-        return [point for point in points if self._is_beyond(place_of(point))]
+        return self._share(middle_of(point)) > 1.0 - _SAME
 
     def piece_of(self, geom: mujoco.MjsGeom) -> NearPart:
         """Return the part of a geom on the near side; one without a length goes by its middle."""
         ends, axis = self._ends(geom)
-        if ends is None:
-            return NearPart(place_of(geom), float(not self._is_beyond(place_of(geom))), axis)
-        inner, outer = (self._share(end) for end in ends)
-        near = ends[0]
-        if inner > outer:
-            near, inner, outer = ends[1], outer, inner
+        if not len(ends):
+            middle = middle_of(geom)
+            return NearPart(middle, float(not self._is_beyond(middle)), axis)
+        near, far = sorted(ends, key=self._share)
+        inner, outer = self._share(near), self._share(far)
         if outer <= self._part + _SAME or inner >= self._part - _SAME:
             return NearPart(near, float(outer <= self._part + _SAME), axis)
         # Exact for a geom that spans the segment.
@@ -429,28 +400,25 @@ class Plane:
         outer = 1.0 if abs(outer - 1.0) < _SAME else outer
         return NearPart(near, (self._part - inner) / (outer - inner), axis)
 
-    def _ends(self, geom: mujoco.MjsGeom) -> tuple[tuple[Array, Array] | None, int]:
+    def _ends(self, geom: mujoco.MjsGeom) -> tuple[Array, int]:
         """Return both ends of a geom's length, and the index of the half-size that it is."""
-        if geom.type in LONG:
-            return axis_ends(geom), 1
         if geom.type != _G.mjGEOM_BOX:
-            return None, 0
+            return axis_ends(geom), 1
         if has_ends(geom):
-            return (np.array(geom.fromto[:3]), np.array(geom.fromto[3:])), 2
-        axes = rotation(orientation(geom))
-        along = np.abs(self.along @ axes) / float(np.linalg.norm(self.along))
+            return points_of(geom), 2
+        axes, length = rotation(orientation(geom)), float(np.linalg.norm(self.along))
+        along = np.abs(self.along @ axes) / length
         axis = int(np.argmax(along))
         if along[axis] >= _ALONG:
             half = axes[:, axis] * geom.size[axis]
-            return (geom.pos - half, geom.pos + half), axis
-        signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, 8)
-        corners = ((axes * geom.size) @ signs).T
-        if len({self._is_beyond(geom.pos + corner) for corner in corners}) == 2:
+            return np.array([geom.pos - half, geom.pos + half]), axis
+        middle, reach = self._share(geom.pos), float(along @ geom.size) / length
+        if middle - reach <= self._part + _SAME < middle + reach:
             raise MorphologyError(
                 f"{geom.name!r} lies oblique to the plane that would cut it in two: cut "
-                f"{self._body.name!r} elsewhere."
+                f"{geom.parent.name!r} elsewhere."
             )
-        return None, axis
+        return np.empty((0, 3)), axis
 
 
 def shorten(geom: mujoco.MjsGeom, piece: NearPart, share: float) -> None:
@@ -459,10 +427,6 @@ def shorten(geom: mujoco.MjsGeom, piece: NearPart, share: float) -> None:
     The near end of the piece stays.
     """
     with same_density(geom):
-        if has_ends(geom):
-            geom.fromto = (piece.near + share * (geom.fromto.reshape(2, 3) - piece.near)).ravel()
-        else:
-            size = np.array(geom.size)
-            size[piece.axis] *= share
-            geom.size = size
-            geom.pos = piece.near + share * (geom.pos - piece.near)
+        if not has_ends(geom):
+            geom.size[piece.axis] *= share
+        move_outwards(geom, piece.near, share)

@@ -114,7 +114,7 @@ def share_contacts(
     """
     halves = {key_of(body): part.name}
     halves |= {(_O.mjOBJ_GEOM, near): far for near, far in cut.items()}
-    for mention in references(spec, "exclusion", "contact pair"):
+    for mention in references(spec, "exclude", "pair"):
         if far := halves.get(mention.element):
             name = mention.holder.name and f"{mention.holder.name}_of_{part.name}"
             setattr(copy_element(spec, mention.holder, spec, name), mention.field, far)

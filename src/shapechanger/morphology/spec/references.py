@@ -7,71 +7,77 @@ that loops hold are sites meanwhile, and keyframes are kept by name (`carried`).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
+from shapechanger.morphology.spec.geometry import is_limited
 
 _O: Final = mujoco.mjtObj
 _T: Final = mujoco.mjtTrn
 _W: Final = mujoco.mjtWrap
 _E: Final = mujoco.mjtEq
 _S: Final = mujoco.mjtSensor
+_BODY, _JOINT, _GEOM, _SITE = _O.mjOBJ_BODY, _O.mjOBJ_JOINT, _O.mjOBJ_GEOM, _O.mjOBJ_SITE
 
 Element = tuple[mujoco.mjtObj, str]
 """Kind and name of an element."""
 
 OF_JOINTS: Final = (_T.mjTRN_JOINT, _T.mjTRN_JOINTINPARENT)
 PINS: Final = (_E.mjEQ_CONNECT, _E.mjEQ_WELD)
-COUPLINGS: Final = {_E.mjEQ_JOINT: _O.mjOBJ_JOINT, _E.mjEQ_TENDON: _O.mjOBJ_TENDON}
+COUPLINGS: Final = {_E.mjEQ_JOINT: _JOINT, _E.mjEQ_TENDON: _O.mjOBJ_TENDON}
 """Equalities y - y0 = p(x - x0) of a follower y and a leader x, and the kind of both."""
 MARK: Final = "pin~"
 """Prefix of the sites that stand for the ends of loops while edits are applied."""
 
 _TARGETS: Final = {
-    _T.mjTRN_JOINT: _O.mjOBJ_JOINT,
-    _T.mjTRN_JOINTINPARENT: _O.mjOBJ_JOINT,
+    **dict.fromkeys(OF_JOINTS, _JOINT),
+    **dict.fromkeys((_T.mjTRN_SITE, _T.mjTRN_SLIDERCRANK), _SITE),
     _T.mjTRN_TENDON: _O.mjOBJ_TENDON,
-    _T.mjTRN_SITE: _O.mjOBJ_SITE,
-    _T.mjTRN_SLIDERCRANK: _O.mjOBJ_SITE,
-    _T.mjTRN_BODY: _O.mjOBJ_BODY,
+    _T.mjTRN_BODY: _BODY,
 }
 _WRAPS: Final = {
-    _W.mjWRAP_JOINT: _O.mjOBJ_JOINT,
-    _W.mjWRAP_SITE: _O.mjOBJ_SITE,
-    _W.mjWRAP_SPHERE: _O.mjOBJ_GEOM,
-    _W.mjWRAP_CYLINDER: _O.mjOBJ_GEOM,
+    **{_W.mjWRAP_JOINT: _JOINT, _W.mjWRAP_SITE: _SITE},
+    **dict.fromkeys((_W.mjWRAP_SPHERE, _W.mjWRAP_CYLINDER), _GEOM),
 }
+# Lists of elements that name others, their fields with names, and the kind of the named elements
+# or a function that returns it; a tuple has one kind for each name.
+_HOLDERS: Final[tuple[tuple[str, str, Any], ...]] = (
+    ("equalities", "name1 name2", lambda e: e.objtype if e.type in PINS else COUPLINGS.get(e.type)),
+    ("excludes", "bodyname1 bodyname2", _BODY),
+    ("pairs", "geomname1 geomname2", _GEOM),
+    ("actuators", "target", lambda actuator: _TARGETS.get(actuator.trntype)),
+    ("actuators", "refsite slidersite", _SITE),
+    ("sensors", "objname", attrgetter("objtype")),
+    ("sensors", "refname", attrgetter("reftype")),
+    ("cameras", "targetbody", _BODY),
+    ("lights", "targetbody", _BODY),
+    ("skins", "bodyname", _BODY),
+    ("flexes", "vertbody nodebody", _BODY),
+    ("tuples", "objname", attrgetter("objtype")),
+)
 # Sensors of all geoms of a body, so of both parts after a split.
 _OF_ALL_GEOMS: Final = (
     *(_S.mjSENS_GEOMDIST, _S.mjSENS_GEOMNORMAL, _S.mjSENS_GEOMFROMTO, _S.mjSENS_CONTACT),
 )
 # Two positions of one joint that differ by less are the same, rad or m.
 _SAME: Final = 1e-6
-# The lists of a specification, the name of their kind in messages, and the fields that name others.
-_HOLDERS: Final = {
-    "equalities": ("equality", "name1", "name2"),
-    "excludes": ("exclusion", "bodyname1", "bodyname2"),
-    "pairs": ("contact pair", "geomname1", "geomname2"),
-    "actuators": ("actuator", "target", "refsite", "slidersite"),
-    "sensors": ("sensor", "objname", "refname"),
-    "cameras": ("camera", "targetbody"),
-    "lights": ("light", "targetbody"),
-    "skins": ("skin", "bodyname"),
-    "flexes": ("flex", "vertbody", "nodebody"),
-    "tuples": ("tuple", "objname"),
-}
 
 
 class Mention(NamedTuple):
     """One element of a model, the holder, that names another."""
 
     holder: Any
-    kind: str  # Kind of the holder, for messages.
     field: str  # Field of the holder that has the name; `path` of a tendon.
     element: Element  # The named one.
+
+    @property
+    def kind(self) -> str:
+        """Kind of the holder."""
+        return kind_of(self.holder)
 
     def __str__(self) -> str:
         if self.holder.name:
@@ -86,46 +92,25 @@ def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     `kinds` such as "actuator" are the holders', by default all.
     """
     found = [
-        Mention(tendon, "tendon", "path", element)
+        Mention(tendon, "path", element)
         for tendon in spec.tendons
         for element in path_elements(tendon)
     ]
-    for elements, (kind, *fields) in _HOLDERS.items():
+    for elements, fields, kind in _HOLDERS:
         for holder in getattr(spec, elements):
-            for field in fields:
-                value: str | list[str] = getattr(holder, field)
-                names = [value] if isinstance(value, str) else list(value)
-                named = _kind_named(holder, field)
-                # A tuple has one kind for each name.
-                targets = [named] * len(names) if isinstance(named, _O) else list(named)
-                for target, name in zip(targets, names, strict=True):
-                    found.append(Mention(holder, kind, field, (_plain(_O(target)), name)))
-    return [each for each in found if each.element[1] and (not kinds or each.kind in kinds)]
+            of = kind(holder) if callable(kind) else kind
+            for field in fields.split():
+                names = getattr(holder, field)
+                names = [names] if isinstance(names, str) else list(names)
+                each = list(of) if isinstance(holder, mujoco.MjsTuple) else [of] * len(names)
+                keys = ((_plain(k), name) for k, name in zip(each, names, strict=True))
+                found += [Mention(holder, field, key) for key in keys if key[1]]
+    return [mention for mention in found if not kinds or mention.kind in kinds]
 
 
-def _kind_named(holder: Any, field: str) -> Any:
-    """Return the kind of the elements that a field names, or the kinds of each."""
-    match field:
-        case "name1" | "name2":
-            coupled = COUPLINGS.get(holder.type, _O.mjOBJ_FLEX)
-            return holder.objtype if holder.type in PINS else coupled
-        case "target":
-            return _TARGETS.get(holder.trntype, _O.mjOBJ_UNKNOWN)
-        case "objname":
-            return holder.objtype
-        case "refname":
-            return holder.reftype
-        case "refsite" | "slidersite":
-            return _O.mjOBJ_SITE
-        case "geomname1" | "geomname2":
-            return _O.mjOBJ_GEOM
-        case _:
-            return _O.mjOBJ_BODY
-
-
-def _plain(kind: mujoco.mjtObj) -> mujoco.mjtObj:
+def _plain(kind: Any) -> mujoco.mjtObj:
     """Return a body for either frame of a body, which sensors distinguish."""
-    return _O.mjOBJ_BODY if kind == _O.mjOBJ_XBODY else kind
+    return _BODY if kind == _O.mjOBJ_XBODY else _O(kind or 0)
 
 
 # --- Kinds, limbs and paths --------------------------------------------------------------------
@@ -170,19 +155,19 @@ def path_elements(tendon: mujoco.MjsTendon) -> list[Element]:
         if wrap.type in _WRAPS:
             found.append((_WRAPS[wrap.type], wrap.target.name))
         if side := wrap.sidesite:
-            found.append((_O.mjOBJ_SITE, side.name))
+            found.append((_SITE, side.name))
     return found
 
 
 def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Element]) -> bool:
     """Return whether a tendon moves only the limb with these elements."""
     staying = {*path_elements(tendon)} - elements
-    if any(kind == _O.mjOBJ_JOINT for kind, _ in staying):
+    if any(kind == _JOINT for kind, _ in staying):
         return False
     # All points elsewhere are on bodies that are fixed to each other.
     carriers: set[str] = set()
     for kind, name in staying:
-        body = (spec.site(name) if kind == _O.mjOBJ_SITE else spec.geom(name)).parent
+        body = (spec.site(name) if kind == _SITE else spec.geom(name)).parent
         while body.parent is not None and not body.joints:
             body = body.parent
         carriers.add(body.name)
@@ -191,10 +176,8 @@ def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Elem
 
 def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
     """Return whether a tendon acts or is used; the humanoid's do neither."""
-    lower, upper = tendon.range
-    automatic = tendon.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
     acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss
-    if tendon.limited == mujoco.mjtLimited.mjLIMITED_TRUE or automatic or acts or tendon.armature:
+    if is_limited(tendon) or acts or tendon.armature:
         return True
     return any(each.element == key_of(tendon) for each in references(spec))
 
@@ -232,7 +215,7 @@ def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str
 def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[str]) -> None:
     """Refuse to split a segment if elements refer to it, or to a geom that would be `cut`."""
     for name in cut:
-        require_unnamed(spec, (_O.mjOBJ_GEOM, name), "would be cut in two", "tendon", "sensor")
+        require_unnamed(spec, (_GEOM, name), "would be cut in two", "tendon", "sensor")
     for mention in references(spec, "actuator", "sensor"):
         whole = mention.kind == "actuator" or mention.holder.type in _OF_ALL_GEOMS
         if whole and mention.element == key_of(body):
@@ -261,8 +244,8 @@ def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
                 "of them first."
             )
     for actuator in spec.actuators:
-        stays = actuator.trntype == _T.mjTRN_SITE and (_O.mjOBJ_SITE, actuator.target) not in gone
-        if stays and (_O.mjOBJ_SITE, actuator.refsite) in gone:
+        stays = actuator.trntype == _T.mjTRN_SITE and (_SITE, actuator.target) not in gone
+        if stays and (_SITE, actuator.refsite) in gone:
             raise MorphologyError(
                 f"The actuator {actuator.name!r} acts relative to {actuator.refsite!r}, which "
                 "would be removed."
@@ -279,7 +262,7 @@ def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
     gone = elements_of(limb)
     release_drawings(spec, gone)
     for aimed in (*spec.cameras, *spec.lights):
-        if (_O.mjOBJ_BODY, aimed.targetbody) in gone:
+        if (_BODY, aimed.targetbody) in gone:
             aimed.targetbody = limb.parent.name
     for group in spec.tuples:
         members = zip(group.objtype, group.objname, group.objprm, strict=True)
@@ -315,13 +298,10 @@ def remove_joint(
                 "be removed alone."
             )
         spec.delete(tendon)
-    for actuator in list(spec.actuators):
-        if (_TARGETS.get(actuator.trntype), actuator.target) in gone:
-            gone.add(key_of(actuator))
-            spec.delete(actuator)
-    for sensor in list(spec.sensors):
-        if (sensor.objtype, sensor.objname) in gone:
-            spec.delete(sensor)
+    for mention in references(spec, "actuator", "sensor"):  # Sensors may name the actuators.
+        if mention.element in gone:
+            gone.add(key_of(mention.holder))
+            spec.delete(mention.holder)
     spec.delete(joint)
 
 
