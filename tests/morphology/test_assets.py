@@ -15,10 +15,9 @@ from shapechanger.morphology import (
     Mass,
     Remove,
     Split,
-    Stretch,
     name_elements,
 )
-from tests.morphology.models import Array, built, differing, mass, posed
+from tests.morphology.models import built, differing, mass, posed
 from tests.morphology.scenes import ASSETS, asset_spec
 
 _MODELS = sorted(name.removesuffix(".xml") for name in os.listdir(ASSETS) if name.endswith(".xml"))
@@ -49,34 +48,6 @@ def test_all_names_are_unique(model: str) -> None:
         assert len({*names}) == len(names)
     if model != "half_cheetah":  # MuJoCo warns about the total mass of this one.
         assert differing(built(asset_spec(model)), built(spec)) == []
-
-
-@pytest.mark.parametrize("model", _MODELS)
-def test_anchors_scale_with_a_stretch(model: str) -> None:
-    before, after = _before(model), built(_named(model), Stretch("*", 1.3))
-    for body in range(1, before.nbody):
-        parent = int(before.body_parentid[body])
-        if parent == 0:
-            np.testing.assert_array_equal(after.body_pos[body], before.body_pos[body])
-            continue
-        np.testing.assert_allclose(
-            _held(after, body, parent), 1.3 * _held(before, body, parent), atol=1e-9
-        )
-
-
-def _held(model: mujoco.MjModel, body: int, parent: int) -> Array:
-    """Return the anchor of a body relative to that of its parent, in the parent's frame, m."""
-    turned = np.empty(3)
-    mujoco.mju_rotVecQuat(turned, _anchor(model, body), model.body_quat[body])
-    return model.body_pos[body] + turned - _anchor(model, parent)
-
-
-def _anchor(model: mujoco.MjModel, body: int) -> Array:
-    """Return the position of a body's first hinge in its frame, m."""
-    first = int(model.body_jntadr[body])
-    joints = range(first, first + int(model.body_jntnum[body]))
-    hinges = [j for j in joints if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE]
-    return model.jnt_pos[hinges[0]] if hinges else np.zeros(3)
 
 
 @pytest.mark.parametrize("model", _MODELS)

@@ -114,25 +114,6 @@ def test_a_joint_at_its_limit_leaves_the_step_to_others() -> None:
     np.testing.assert_allclose(pose, [1.0, 1.0, -0.5], atol=1e-8)
 
 
-def test_objects_stay_where_a_weld_holds_them() -> None:
-    """The robot moves to what it is tied to."""
-    model = mujoco.MjModel.from_xml_string(
-        """
-        <mujoco><worldbody>
-          <geom type="plane" size="9 9 1"/>
-          <body name="hand" mocap="true" pos="0 0 .05"/>
-          <body name="base"><joint name="x" type="slide" axis="1 0 0"/>
-            <joint name="z" type="slide" axis="0 0 1"/><geom size=".1" pos="0 0 .05"/></body>
-        </worldbody>
-        <equality><connect body1="base" body2="hand" anchor="0 0 .05"/></equality>
-        <actuator><motor joint="x" ctrlrange="-1 1"/></actuator></mujoco>"""
-    )
-    rules = StartRules(model)
-    # Its geom is in the floor, and the weld does not let it be lifted.
-    pose = rules.feasible(np.array([0.3, 0.2]), mujoco.MjData(model))
-    np.testing.assert_allclose(pose, 0.0, atol=1e-6)
-
-
 def test_inactive_equalities_close_nothing() -> None:
     text = _COUPLED.format(low=-3, high=3, coefficients="0 1 0 0 0").replace(
         "<joint joint1", '<joint active="false" joint1'

@@ -34,17 +34,6 @@ BODY = (
 )
 
 
-def test_a_body_is_a_list_of_tagged_objects() -> None:
-    """Default values are omitted."""
-    assert json.loads(to_json(BODY)) == [
-        {"edit": "stretch", "body": "shank_*", "factor": 2.0},
-        {"edit": "mass", "element": "torso", "to": 2.0},
-        {"edit": "add_segment", "body": "shin", "name": "foot", "end": [0.1, 0, -0.2], "gear": 3.0},
-        {"edit": "gravity", "amount": 0.5, "to": [0, 0, -1.62]},
-        {"edit": "remove", "body": "tail"},
-    ]
-
-
 def test_a_body_round_trips_through_json() -> None:
     """Text, bytes, single objects and integers are accepted."""
     assert from_json(to_json(BODY)) == from_json(to_json(BODY).encode()) == BODY
@@ -63,18 +52,9 @@ def test_invalid_json_is_refused(text: str | bytes) -> None:
         from_json(text)
 
 
-@pytest.mark.parametrize("text", ["1", '"stretch"', "[[]]", '[{"kind":"stretch"}]', "[null]"])
-def test_other_json_is_refused(text: str) -> None:
-    for read in (from_json, lambda text: as_body(json.loads(text))):
-        with pytest.raises(
-            MorphologyError, match=r'A body .* with the key "edit", not of|JSON list'
-        ):
-            read(text)
-
-
 @pytest.mark.parametrize("kind", ["strech", "", None, 3, ["stretch"]])
 def test_unknown_kinds_and_fields_are_refused(kind: object) -> None:
-    with pytest.raises(UnknownName, match=r"No edit matches .* There are: joint_range, lock, add"):
+    with pytest.raises(UnknownName, match=r"No edit matches .* There are: .*gravity, lock, add"):
         from_json(json.dumps([{"edit": kind, "body": "shin"}]))
     with pytest.raises(UnknownName, match=r"Did you mean 'stretch'\?"):
         from_json('[{"edit":"strech"}]')
@@ -100,15 +80,6 @@ def test_invalid_fields_are_refused(fields: dict[str, Any], message: str) -> Non
     """The error starts with the kind of edit."""
     with pytest.raises(MorphologyError, match=message):
         from_json(json.dumps(fields))
-
-
-@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-def test_infinite_numbers_are_refused(number: str) -> None:
-    """NaN and infinity are refused, although Python's parser accepts them."""
-    with pytest.raises(MorphologyError, match="stretch: "):
-        from_json(f'[{{"edit":"stretch","body":"shin","factor":{number}}}]')
-    with pytest.raises(MorphologyError, match="lock: position of Lock: Expected a finite number"):
-        from_json(f'[{{"edit":"lock","joint":"hip","position":{number}}}]')
 
 
 def test_as_body_accepts_several_forms() -> None:

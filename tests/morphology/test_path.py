@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from shapechanger.envs.ant import ANT
-from shapechanger.envs.pendulum import PENDULUM
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
     EDITS,
@@ -41,7 +40,7 @@ from shapechanger.morphology import (
     TotalMass,
     interpolate,
 )
-from tests.morphology.models import ant, built, leg, mass, pendulum, physics
+from tests.morphology.models import ant, built, leg, mass, physics
 
 # One edit of each kind, for the leg.
 ONE_OF_EACH: tuple[Edit, ...] = (
@@ -106,11 +105,6 @@ def test_edits_of_one_body_only_fade() -> None:
     )
 
 
-def test_scale_and_to_are_different_edits() -> None:
-    path = interpolate((Mass("*", scale=2.0),), (Mass("*", to=2.0),), 0.5)
-    assert path == (Mass("*", scale=2.0, amount=0.5), Mass("*", to=2.0, amount=0.5))
-
-
 def test_a_motor_of_one_body_fades() -> None:
     """A segment with and without a motor is one segment, whose gear is interpolated."""
     passive, active = ANT.body("ExtendedAntPassive"), ANT.body("ExtendedAnt")
@@ -143,11 +137,6 @@ def _assert_continuous(
 @pytest.mark.parametrize("pair", [*itertools.combinations(ANT.bodies, 2)], ids="-".join)
 def test_the_ants_change_continuously(pair: tuple[str, str]) -> None:
     _assert_continuous(ant, ANT.body(pair[0]), ANT.body(pair[1]))
-
-
-@pytest.mark.parametrize("pair", [*itertools.combinations(PENDULUM.bodies, 2)], ids="-".join)
-def test_the_pendulums_change_continuously(pair: tuple[str, str]) -> None:
-    _assert_continuous(pendulum, PENDULUM.body(pair[0]), PENDULUM.body(pair[1]))
 
 
 @pytest.mark.parametrize("edit", ONE_OF_EACH, ids=lambda edit: type(edit).__name__)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shapechanger.envs.ant import ANT
-from shapechanger.morphology import JointRange, Stretch
+from shapechanger.morphology import Stretch
 from shapechanger.morphology.pose import (
     Lift,
     StartRules,
@@ -16,7 +16,7 @@ from shapechanger.morphology.pose import (
     start_pose,
     trunk_lift,
 )
-from tests.morphology.models import ant, built, gantry, leg, posed, spec_of
+from tests.morphology.models import ant, built, posed, spec_of
 
 _BALL = """
 <mujoco>
@@ -108,25 +108,6 @@ def test_no_foot_starts_in_the_floor(body: str, factor: float) -> None:
     assert pose[2] >= model.qpos0[2]
 
 
-def test_a_pose_is_moved_inside_the_limits() -> None:
-    """Limited joints move to the nearest limit; the given pose is not changed."""
-    model = built(leg(), JointRange("hip", -0.5, 0.5))
-    pose = model.qpos0 + 7.0
-    inside = StartRules(model).keep_within_limits(pose)
-    np.testing.assert_array_equal(inside[:7], pose[:7])
-    np.testing.assert_allclose(inside[7:], [0.5, 0.0])
-    np.testing.assert_array_equal(pose, model.qpos0 + 7.0)
-    free = built(gantry())
-    far = np.array([5.0, -5.0, 9.0, 9.0, 5.0])
-    np.testing.assert_allclose(StartRules(free).keep_within_limits(far), [2.0, -1.0, 9.0, 9.0, 2.0])
-
-
-def test_a_body_without_joints_has_an_empty_pose() -> None:
-    model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    assert start_pose(model).shape == (0,)
-    assert standing_height(model) is None
-
-
 _HOPPER = """
 <mujoco>
   <worldbody>
@@ -194,13 +175,6 @@ def test_feet_on_a_slide_start_on_the_floor(axis: str) -> None:
         stands = standing_height(model, pose)
         assert stands is not None
         assert lift.height(pose) == pytest.approx(max(height, stands))
-
-
-def test_the_distance_from_the_limits_can_be_given() -> None:
-    model = _hopper()
-    place = model.joint("leg").qposadr[0]
-    starts = [np.rad2deg(start_pose(model, inside)[place]) for inside in (0.0, 0.1, 0.5)]
-    assert starts == pytest.approx([-30.0, -42.0, -90.0])
 
 
 def test_a_standing_pose_touches_the_floor() -> None:

@@ -6,6 +6,7 @@ limbs are the robot's: of all that its actuators move, directly or by a coupling
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
@@ -14,10 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.certificate.numbers import kinds_of
+from shapechanger.morphology.spec.closing import (
+    CLOSED,
+    SINGULAR,
+    close,
+    equality_rows,
+    largest,
+)
 
 _Array = NDArray[np.float64]
 _J: Final = mujoco.mjtJoint
-_E: Final = mujoco.mjtEq
 GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 """Types of geoms that a body can stand on."""
 
@@ -30,20 +37,9 @@ _FAR_M: Final = 1000.0
 _LOCKED: Final = 1e5
 # Tolerance of the vertical part of an axis that counts as vertical.
 _VERTICAL: Final = 1e-6
-# Equalities that a pose can close, by Gauss-Newton steps on MuJoCo's own Jacobian.
-_SOLVED: Final = [
-    int(kind) for kind in (_E.mjEQ_CONNECT, _E.mjEQ_WELD, _E.mjEQ_JOINT, _E.mjEQ_TENDON)
-]
-CLOSED: Final = 1e-9
-"""Residual of an equality that is closed, m or rad; above the rounding of a compiled model."""
-# A longer step, rad or m, can jump to another way to assemble the loop.
-_LONGEST_STEP: Final = 0.2
 # Steps towards each start pose, and its largest violation, m or rad.
 _MOST_STEPS: Final = 40
 _START_CLOSED: Final = 1e-4
-_UNLIMITED: Final = np.array([[-np.inf], [np.inf]])
-# Singular values below this share of the largest do not close a loop.
-_SINGULAR: Final = 1e-6
 # Shares of a drawn deviation that are tried, until one can be closed.
 _SHARES: Final = (0.5, 0.25, 0.125)
 # Deviations from a drawn pose, rad or m, that are tried where the file's own pose is outside its
@@ -73,40 +69,37 @@ def moved_trees(model: mujoco.MjModel) -> list[int]:
     everything = list(range(int(model.ntree)))
     if len(everything) < 2 or not model.nu:
         return everything
-    kinds, moved = kinds_of(model), dict[int, int]()
+    kinds, moved = kinds_of(model), Counter[int]()
 
-    def trees(kind: str, ends: list[int]) -> set[int]:
-        bodies = [body for end in ends for body in _bodies(model, kinds, kind, end)]
+    def trees(kind: str, *ends: int) -> set[int]:
+        bodies = [body for end in ends for body in _bodies(model, kinds, kind, int(end))]
         return {int(model.body_treeid[body]) for body in bodies} - {-1}
 
-    pulled = zip(kinds["actuator_target_kinds"], model.actuator_trnid.tolist(), strict=True)
+    pulled = zip(kinds["actuator_target_kinds"], model.actuator_trnid, strict=True)
     for kind, ends in pulled:
-        for tree in trees(kind, ends if kind == "sites" else ends[:1]):
-            moved[tree] = moved.get(tree, 0) + 1
+        moved.update(trees(kind, *(ends if kind == "sites" else ends[:1])))
     coupled = [
-        trees(kinds["eq_kinds"][i], [int(model.eq_obj1id[i]), int(model.eq_obj2id[i])])
-        for i in np.flatnonzero(model.eq_active0).tolist()
+        trees(kinds["eq_kinds"][i], model.eq_obj1id[i], model.eq_obj2id[i])
+        for i in np.flatnonzero(model.eq_active0)
     ]
-    size = -1
-    while size < len(moved):  # Joints that an equality couples count without an actuator.
-        size = len(moved)
+    for _ in everything:  # Joints that an equality couples count without an actuator.
         for tied in coupled:
             if not tied.isdisjoint(moved):
-                moved |= dict.fromkeys(tied - moved.keys(), 0)
+                moved.update(dict.fromkeys(tied, 0))
     return sorted(moved, key=lambda tree: (-moved[tree], tree)) or everything
 
 
 def _bodies(model: mujoco.MjModel, kinds: dict[str, list[str]], kind: str, at: int) -> list[int]:
     """Return the body that an element is on, or all along a tendon; none for other kinds."""
-    carriers = {"joints": "jnt_bodyid", "sites": "site_bodyid", "geoms": "geom_bodyid"}
-    if at < 0 or kind not in (*carriers, "bodies", "tendons"):
-        return []
-    if kind == "tendons":
+    carriers = {"joints": model.jnt_bodyid, "sites": model.site_bodyid, "geoms": model.geom_bodyid}
+    if kind == "tendons" and at >= 0:
         start = int(model.tendon_adr[at])
         path = range(start, start + int(model.tendon_num[at]))
         parts = [(kinds["wrap_kinds"][i], int(model.wrap_objid[i])) for i in path]
         return [body for part in parts for body in _bodies(model, kinds, *part)]
-    return [at if kind == "bodies" else int(getattr(model, carriers[kind])[at])]
+    if kind == "bodies":
+        return [at] if at >= 0 else []
+    return [int(carriers[kind][at])] if at >= 0 and kind in carriers else []
 
 
 class Lift(NamedTuple):
@@ -265,21 +258,18 @@ class StartRules:
     def __init__(self, model: mujoco.MjModel) -> None:
         self.lift = trunk_lift(model)
         self._model = model
-        one_number = np.isin(model.jnt_type, (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE)))
-        limited = one_number & (model.jnt_limited != 0)
+        limited = (model.jnt_type > int(_J.mjJNT_BALL)) & (model.jnt_limited != 0)
         # A single tree is the robot; runners read these rules at each reset.
-        several = model.ntree > 1
-        self._robot = robot_bodies(model) if several else np.arange(model.nbody) > 0
+        self._robot = robot_bodies(model) if model.ntree > 1 else np.arange(model.nbody) > 0
         joints = np.flatnonzero(limited & self._robot[model.jnt_bodyid])
         self.lowest, self.highest = model.jnt_range[joints].T
         self.limited_places = model.jnt_qposadr[joints]
         self.floor_pairs: list[tuple[int, int]] = []
         of_world = model.body_weldid[model.geom_bodyid] == 0
         own = ~of_world & self._robot[model.geom_bodyid]
+        kinds, others = model.geom_contype, model.geom_conaffinity
         for floor in np.flatnonzero(of_world & np.isin(model.geom_type, GROUND)).tolist():
-            touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
-                model.geom_conaffinity & model.geom_contype[floor]
-            )
+            touching = (kinds & others[floor]) | (others & kinds[floor])
             geoms = np.flatnonzero(own & (touching != 0)).tolist()
             self.floor_pairs += [(floor, geom) for geom in geoms]
 
@@ -301,11 +291,8 @@ class StartRules:
 
         They keep the share `inside` of their range from the limits.
         """
-        result = pose.copy()
-        low, high = self.lowest, self.highest
-        if inside:
-            margin = inside * (high - low)
-            low, high = low + margin, high - margin
+        result, margin = pose.copy(), inside * (self.highest - self.lowest)
+        low, high = self.lowest + margin, self.highest - margin
         # `np.clip` takes four times as long, a tenth of the reset of a pendulum.
         result[self.limited_places] = np.minimum(np.maximum(pose[self.limited_places], low), high)
         return result
@@ -349,7 +336,7 @@ class StartRules:
             return velocity
         self._violation(pose, data)
         jacobian = np.where(self.robot_dofs, equality_rows(self._model, data)[2], 0.0)
-        return velocity - np.linalg.pinv(jacobian, _SINGULAR) @ (jacobian @ velocity)
+        return velocity - np.linalg.pinv(jacobian, SINGULAR) @ (jacobian @ velocity)
 
     def _lift(self, pose: _Array, data: mujoco.MjData) -> None:
         """Lift the trunk of a pose until its feet are not in the floor, in place."""
@@ -363,7 +350,7 @@ class StartRules:
         """Return the largest violation of an equality at a pose, which `data` take."""
         data.qpos[:] = pose
         mujoco.mj_fwdPosition(self._model, data)
-        return _largest(equality_rows(self._model, data)[1])
+        return largest(equality_rows(self._model, data)[1])
 
     def _closed(self, drawn: _Array, start: _Array, goal: float, data: mujoco.MjData) -> _Array:
         """Return the pose next to a drawn one, inside the limits, with no larger violation."""
@@ -397,57 +384,3 @@ class StartRules:
         moved = pose.copy()
         mujoco.mj_integratePos(self._model, moved, step, 1.0)
         return self.keep_within_limits(moved)
-
-
-# --- Closed loops ------------------------------------------------------------------------------
-
-
-def equality_rows(
-    model: mujoco.MjModel, data: mujoco.MjData
-) -> tuple[NDArray[np.int32], _Array, _Array]:
-    """Return the equality, the violation and the Jacobian (n, nv) of each row of equalities.
-
-    The data have gone through `mj_fwdPosition`.
-    """
-    ids = data.efc_id[: int(data.ne)]
-    rows = np.flatnonzero(np.isin(model.eq_type[ids], _SOLVED))
-    dense = np.zeros((int(data.nefc), model.nv))
-    if mujoco.mj_isSparse(model):
-        mujoco.mju_sparse2dense(
-            dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
-        )
-    else:
-        dense[:] = data.efc_J.reshape(dense.shape)
-    return ids[rows], data.efc_pos[rows], dense[rows]
-
-
-def close(
-    model: mujoco.MjModel, data: mujoco.MjData, movable: NDArray[np.bool_], most_steps: int
-) -> float:
-    """Move the pose in `data` to the nearest in which the equalities hold.
-
-    Only the `movable` degrees of freedom (nv,) move; hinges and slides stay inside their limits, or
-    get no farther outside. The largest violation that is left is returned, m or rad.
-    """
-    scalar, at_limit = np.flatnonzero(model.jnt_type > int(_J.mjJNT_BALL)), np.zeros(model.nv, bool)
-    places, dofs = model.jnt_qposadr[scalar], model.jnt_dofadr[scalar]
-    low, high = np.where(model.jnt_limited[scalar], model.jnt_range[scalar].T, _UNLIMITED)
-    low, high = np.minimum(low, data.qpos[places]), np.maximum(high, data.qpos[places])
-    for _ in range(most_steps):
-        _, gaps, jacobian = equality_rows(model, data)
-        if _largest(gaps) <= CLOSED:
-            break
-        step, moving = np.zeros(model.nv), movable & ~at_limit
-        step[moving] = -np.linalg.pinv(jacobian[:, moving], _SINGULAR) @ gaps
-        step *= min(1.0, _LONGEST_STEP / max(_largest(step), _LONGEST_STEP))
-        mujoco.mj_integratePos(model, data.qpos, step, 1.0)
-        clipped = np.clip(data.qpos[places], low, high)
-        # A joint at its limit is left out of the next step, which the others must make.
-        at_limit[dofs] = clipped != data.qpos[places]
-        data.qpos[places] = clipped
-        mujoco.mj_fwdPosition(model, data)
-    return _largest(equality_rows(model, data)[1])
-
-
-def _largest(numbers: _Array) -> float:
-    return float(np.abs(numbers).max(initial=0.0))

@@ -34,14 +34,6 @@ def _range(model: mujoco.MjModel, joint: str) -> list[float]:
     return model.joint(joint).range.tolist()
 
 
-def test_limits_are_given_in_radians() -> None:
-    """Units do not depend on the model; a limit that is not given stays."""
-    assert _range(built(leg(), JointRange("knee", -1.0, 0.5)), "knee") == pytest.approx([-1.0, 0.5])
-    assert _range(built(leg(), JointRange("knee", lower=-1.0)), "knee") == pytest.approx([-1.0, 0])
-    model = built(gantry(), JointRange("swing", upper=0.25))
-    assert _range(model, "swing") == [-2.0, 0.25]
-
-
 @pytest.mark.parametrize("degrees", range(-180, 181, 6))
 def test_degrees_are_exact(degrees: int) -> None:
     """Limits of whole degrees equal bitwise those of a file in degrees."""
@@ -89,12 +81,6 @@ def test_motors_are_as_strong_as_the_model_allows() -> None:
         reshape(spec_of(URDF), [AddMotor("*")])
     half = built(spec_of(URDF), AddMotor("shoulder", amount=0.5))
     assert half.actuator_gear[0, 0] == 3.5
-
-
-def test_a_joint_gets_one_motor() -> None:
-    """A glob leaves joints with a motor as they are."""
-    model = built(spec_of(URDF), AddMotor("elbow", 3.0), AddMotor("*", 5.0))
-    np.testing.assert_array_equal(model.actuator_gear[:, 0], [3.0, 5.0])
 
 
 def test_a_motor_of_something_else_is_no_motor_of_the_joint() -> None:

@@ -14,11 +14,8 @@ from shapechanger.morphology import (
     AddSegment,
     Cut,
     Edit,
-    Lock,
-    Mass,
     Remove,
     Split,
-    Stretch,
 )
 from tests.morphology.models import (
     arm,
@@ -68,16 +65,6 @@ def test_a_cut_leaves_something() -> None:
     spec.geom("lower").fromto = [0.3, 0.0, 0.0, 0.4, 0.0, 0.0]
     with pytest.raises(MorphologyError, match=r"No geom of 'lower' lies nearer than 0\.5 of its"):
         built(spec, Cut("lower", 0.5))
-
-
-def test_a_partial_cut_shrinks_what_goes() -> None:
-    """Geoms beyond it become small, and points at the end are pulled in by a part of the way."""
-    spec = arm(lower='<geom name="far" size=".01" pos=".35 0 0"/><site name="end" pos=".4 0 0"/>')
-    half = built(spec, Cut("lower", 0.5).partly(0.5))
-    assert half.geom("far").size[0] == pytest.approx(0.005)
-    np.testing.assert_allclose(half.geom("far").pos, [0.35, 0.0, 0.0])
-    np.testing.assert_allclose(half.site("end").pos, [0.3, 0.0, 0.0])
-    np.testing.assert_allclose(half.site("hand").pos, [0.3, 0.0, 0.0])
 
 
 # --- Remove ------------------------------------------------------------------------------------
@@ -214,37 +201,11 @@ def test_a_body_without_hinge_needs_an_axis() -> None:
 # --- AddLimb -----------------------------------------------------------------------------------
 
 
-def test_a_copy_has_all_elements_of_the_limb() -> None:
-    """Bodies, joints, geoms, sites and motors get the suffix; motors come last."""
-    model = built(leg(), AddLimb("thigh", "_2", math.pi))
-    assert _bodies(model) == ["trunk", "thigh", "shin", "thigh_2", "shin_2"]
-    assert [model.actuator(i).name for i in range(model.nu)] == ["hip", "knee", "hip_2", "knee_2"]
-    for name in ("hip", "knee"):
-        old, new = model.joint(name), model.joint(f"{name}_2")
-        for field in ("range", "armature", "damping", "stiffness", "axis", "pos"):
-            np.testing.assert_array_equal(getattr(new, field), getattr(old, field))
-        assert model.actuator(f"{name}_2").trnid[0] == new.id
-
-
 def test_a_mesh_cannot_be_scaled() -> None:
     for edit in (AddLimb("claw", "_2", 1.0, size=2.0), Remove("claw").partly(0.5)):
         with pytest.raises(MorphologyError, match=r"'claw(_2)?' holds 'claw(_2)?', a mesh"):
             built(spec_of(_MESH_LIMB), edit)
     assert built(spec_of(_MESH_LIMB), Remove("claw")).nbody == 2
-
-
-@pytest.mark.parametrize("kind", ["body", "joint", "geom"])
-def test_a_copy_with_used_names_is_refused(kind: str) -> None:
-    spec = leg()
-    trunk = spec.body("trunk")
-    if kind == "body":
-        trunk.add_body(name="shin_2", mass=1.0, inertia=[1.0, 1.0, 1.0], explicitinertial=True)
-    elif kind == "geom":
-        spec.geom("trunk").name = "sole_2"
-    else:
-        spec.joint("root").name = "knee_2"
-    with pytest.raises(MorphologyError, match=f"A new {kind} needs an unused name, got '"):
-        built(spec, AddLimb("thigh", "_2", 1.0))
 
 
 @pytest.mark.parametrize(
@@ -289,23 +250,3 @@ def test_a_partial_limb_is_small_and_weak(
 
 
 # --- Combinations ------------------------------------------------------------------------------
-
-
-def test_new_segments_can_be_edited() -> None:
-    model = built(
-        leg(),
-        Split("shin", "ankle", gear=1.0),
-        AddSegment("ankle", "foot", (0.1, 0.0, 0.0), gear=2.0),
-        AddLimb("thigh", "_2", math.pi),
-        Stretch("foot*", 2.0),
-        Mass("foot_2", to=0.5),
-        Lock("ankle_2", 0.1),
-        Cut("ankle", 0.5),
-    )
-    assert _bodies(model) == [
-        *("trunk", "thigh", "shin", "ankle", "thigh_2", "shin_2", "ankle_2", "foot_2")
-    ]
-    assert [model.actuator(i).name for i in range(model.nu)] == [
-        *("hip", "knee", "ankle", "hip_2", "knee_2", "foot_2")
-    ]
-    assert mass(model, "foot_2") == pytest.approx(0.5)

@@ -37,7 +37,7 @@ from shapechanger.morphology import (
     Stretch,
     TotalMass,
 )
-from tests.morphology.models import ant, arm, built, gantry, leg, limb, spec_of
+from tests.morphology.models import ant, arm, built, gantry, leg, limb
 from tests.morphology.test_path import ONE_OF_EACH
 
 _VALUES: list[Any] = [Mass, Density, Gear, Damping, Stiffness, Friction]
@@ -114,7 +114,7 @@ def test_the_bounds_are_those_that_are_documented() -> None:
         (lambda: JointRange("hip"), "needs a lower or upper limit"),
         (lambda: JointRange("hip", 2.0, 1.0), "lower limit must be below the upper one"),
         (lambda: Gravity((200.0, 0.0, -200.0)), "Gravity is at most 250 m/s², got 282.8"),
-        (lambda: PlaceGeom("a", start=_END), "An axis has a start and an end, got"),
+        (lambda: PlaceGeom("a", start=_END), "by two different ends or by its middle"),
         (lambda: PlaceGeom("a", _END, _END), "by two different ends or by its middle"),
         (lambda: PlaceGeom("a"), "PlaceGeom takes two ends, a middle or a radius"),
         (lambda: Mass("a", scale=np.array([1.0, 2.0])), "scale of Mass: Expected `float | null`"),  # type: ignore[arg-type]
@@ -158,9 +158,9 @@ def test_the_nearest_element_of_the_kind_is_suggested(edit: Edit) -> None:
             (ant, edit, "'root' is neither a hinge nor a slide, so it has no range")
             for edit in (JointRange("*", -1.0, 1.0), Lock("root"))
         ),
-        (leg, JointRange("knee", lower=1.0), r"The range of 'knee' would be 1 to 0\."),
+        (leg, JointRange("knee", lower=1.0), r"The range of 'knee' would be 1.0 to"),
         *(
-            (gantry, edit, "'y' slides without limits: give both of them")
+            (gantry, edit, "'y' slides without limits: give both")
             for edit in (JointRange("y", lower=-1.0), JointRange("y", upper=1.0))
         ),
         (gantry, Lock("y"), "'y' slides without limits, so it has no middle"),
@@ -177,19 +177,14 @@ def test_the_nearest_element_of_the_kind_is_suggested(edit: Edit) -> None:
         (
             lambda: limb('<geom name="g" size=".1" mass="2"/>'),
             Density("link", scale=2.0),
-            "'g' has its mass written out, so its density has",
+            "'link' has a mass or inertia written out, so its density has",
         ),
         (
             lambda: limb(
                 '<inertial pos="0 0 0" mass="2" diaginertia=".1 .1 .1"/><geom size=".1"/>'
             ),
             Density("link", scale=2.0),
-            "'link' has its inertia written out, so its density",
-        ),
-        (
-            lambda: spec_of('<mujoco><worldbody><geom size=".1"/></worldbody></mujoco>'),
-            AddMotor("*"),
-            "has no joints, so there is nothing to add a motor",
+            "'link' has a mass or inertia written out, so its density has",
         ),
         (leg, PlaceGeom("sole", (0.0, 0.0, 0.0), _END), "'sole' is no capsule or cylinder"),
         (leg, PlaceGeom("trunk", radius=0.1), "'trunk' is no sphere, capsule or cylinder"),

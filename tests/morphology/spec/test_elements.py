@@ -153,20 +153,6 @@ def test_a_total_mass_does_not_undo_an_edit() -> None:
     assert mass(built(asset_spec("half_cheetah"), Mass("*", to=0.5))) == pytest.approx(3.5)
 
 
-def test_a_total_mass_scales_explicit_inertias() -> None:
-    spec = spec_of(
-        """<mujoco><compiler settotalmass="10"/><worldbody>
-        <body name="a"><freejoint/><geom type="capsule" size=".1 .2" mass="1"/>
-        <body name="b"><inertial pos="0 0 0" mass="3" diaginertia=".1 .2 .2"/></body></body>
-        </worldbody></mujoco>"""
-    )
-    make_explicit(spec)
-    model = built(spec)
-    assert mass(model, "a") == pytest.approx(2.5)
-    assert mass(model, "b") == pytest.approx(7.5)
-    np.testing.assert_allclose(sorted(model.body("b").inertia), [0.25, 0.5, 0.5])
-
-
 def test_least_masses_do_not_swallow_an_edit() -> None:
     """They are written out, and bind nothing any more."""
     spec = arm(top='<compiler boundmass="1" boundinertia=".1"/>')

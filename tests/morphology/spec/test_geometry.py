@@ -88,9 +88,7 @@ def test_stretches_apply_along_the_axis(content: str, axis: str | None, sizes: l
 @pytest.mark.parametrize("shape", ["capsule", "box"])
 def test_an_oblique_geom_cannot_be_stretched_along_an_axis(shape: str) -> None:
     content = f'<geom name="g" type="{shape}" size=".1 .2 .3" euler="0 30 0"/>'
-    with pytest.raises(
-        MorphologyError, match="'g' lies oblique to the axis 'z': stretch it along all"
-    ):
+    with pytest.raises(MorphologyError, match="'g' lies oblique to the axis: stretch it along"):
         _sizes(content, Stretch("link", 2.0, "z"))
 
 
@@ -152,8 +150,3 @@ def test_meshes_and_explicit_inertias_prevent_reshaping(edit: Stretch | Radius |
         built(spec_of(_MESH), edit)
     with pytest.raises(MorphologyError, match="'link' has its inertia written out, so it would n"):
         built(limb(_WRITTEN_OUT), edit)
-
-
-def test_inertiafromgeom_allows_reshaping() -> None:
-    spec = limb(_WRITTEN_OUT, 'inertiafromgeom="true"')
-    assert mass(built(spec, Radius("link", 2.0)), "link") > 2.0

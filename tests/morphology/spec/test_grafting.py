@@ -12,7 +12,7 @@ from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
     AddLimb,
 )
-from shapechanger.morphology.spec.grafting import copy_element, copy_limb
+from shapechanger.morphology.spec.grafting import copy_element
 from tests.morphology.models import (
     arm,
     built,
@@ -21,50 +21,6 @@ from tests.morphology.models import (
     spatial,
     spec_of,
 )
-
-_WITH_ASSETS = """
-<mujoco>
-  <compiler angle="radian"/>
-  <asset>
-    <mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"/>
-    <texture name="plain" type="2d" builtin="flat" rgb1="1 0 0" width="4" height="4"/>
-    <material name="red" texture="plain"/>
-  </asset>
-  <default><default class="leg"><geom density="500"/><joint damping="3"/></default></default>
-  <worldbody>
-    <body name="trunk" pos="0 0 1"><freejoint name="root"/>
-      <geom name="trunk" type="box" size=".2 .1 .05"/>
-      <body name="thigh" pos="0 .2 0" childclass="leg">
-        <joint name="hip" axis="1 0 0" range="-1 1"/>
-        <geom name="thigh" type="capsule" fromto="0 0 0 0 .3 0" size=".03" material="red"/>
-        <body name="shin" pos="0 .3 0">
-          <joint name="knee" axis="1 0 0" range="-1 1"/>
-          <geom name="shin" type="capsule" fromto="0 0 0 0 .3 0" size=".03" material="red"/>
-          <geom name="horn" type="mesh" mesh="wedge" mass=".1"/>
-          <site name="tip" pos="0 .3 0" material="red"/>
-          <camera name="eye"/><light name="lamp"/>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-
-
-def test_a_copied_limb_shares_the_assets() -> None:
-    spec = spec_of(_WITH_ASSETS)
-    before = built(spec)
-    for suffix, angle in (("_2", 2.0), ("_3", 4.0)):
-        copy = copy_limb(spec, spec.body("thigh"), suffix, angle)
-        assert copy.name == f"thigh{suffix}"
-    after = built(spec)
-    assert (after.nmesh, after.nmat, after.ntex) == (before.nmesh, before.nmat, before.ntex)
-    assert after.geom("shin_3").matid == after.site("tip_2").matid == after.material("red").id
-    assert after.geom("horn_2").dataid == after.geom("horn").dataid
-    np.testing.assert_array_equal(after.body("shin_2").inertia, before.body("shin").inertia)
-    assert after.joint("knee_3").damping[0] == 3.0
-    assert after.camera("eye_2").bodyid == after.body("shin_2").id
-    assert after.light("lamp_2").bodyid == after.body("shin_2").id
 
 
 def test_a_copied_geom_equals_the_original() -> None:

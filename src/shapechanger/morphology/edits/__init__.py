@@ -11,7 +11,7 @@ import importlib
 import math
 import pkgutil
 import re
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, TypeVar, cast
+from typing import Annotated, Any, ClassVar, Final, TypeVar, cast
 
 import msgspec
 import mujoco
@@ -19,9 +19,7 @@ import numpy as np
 from msgspec.structs import force_setattr
 
 from shapechanger.errors import MorphologyError
-
-if TYPE_CHECKING:
-    from shapechanger.morphology.spec.carried import Keyframes
+from shapechanger.morphology.spec.carried import Keyframes
 
 _N = TypeVar("_N", float, np.ndarray)
 

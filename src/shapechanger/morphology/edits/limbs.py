@@ -7,7 +7,7 @@ it that can be run.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import mujoco
 import numpy as np
@@ -32,9 +32,7 @@ from shapechanger.morphology.spec import (
     select,
     select_limbs,
 )
-
-if TYPE_CHECKING:
-    from shapechanger.morphology.spec.carried import Keyframes
+from shapechanger.morphology.spec.carried import Keyframes
 
 _J: Final = mujoco.mjtJoint
 _O: Final = mujoco.mjtObj
@@ -276,7 +274,9 @@ class Split(Edit, frozen=True):
     gear: float | None = None
     axis: Vector | None = None
 
-    check = _check_hinge
+    def check(self) -> None:
+        """Refuse a range, gear or axis of zero."""
+        _check_hinge(self)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Split the segment."""
@@ -416,7 +416,7 @@ def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
 
 def _resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
     """Scale a limb in size and strength, in place, with everything attached to it."""
-    for body in references.subtree(limb):
+    for body in (e for e in references.whole(limb) if isinstance(e, mujoco.MjsBody)):
         geometry.require_geometry(spec, body)
         held = geometry.anchor(body)
         for geom in body.geoms:
@@ -436,7 +436,7 @@ def _resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> No
             tendon.range *= factor
             # A negative length stands for the length in the reference pose.
             tendon.springlength[tendon.springlength > 0.0] *= factor
-    for mention in references.references(spec, "actuator"):
+    for mention in references.mentions(spec, "actuator"):
         strong = mention.element[0] in (_O.mjOBJ_JOINT, _O.mjOBJ_TENDON)
         if strong and mention.element in elements:
             scale_strength(mention.holder, factor)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import mujoco
 import numpy as np
@@ -17,9 +17,7 @@ from msgspec import Meta
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits import Edit, Positive, Ratio, Vector, part_of_the_way
 from shapechanger.morphology.spec import geometry, references, require_free_name, select
-
-if TYPE_CHECKING:
-    from shapechanger.morphology.spec.carried import Keyframes
+from shapechanger.morphology.spec.carried import Keyframes
 
 _G: Final = mujoco.mjtGeom
 _J: Final = mujoco.mjtJoint
@@ -134,7 +132,17 @@ class PlaceGeom(Edit, frozen=True):
                 references.release_drawings(spec, {references.key_of(geom.parent)})
             with geometry.same_density(geom):
                 if self.start is not None:
-                    self._place_ends(geom)
+                    old, new = geometry.axis_ends(geom), np.array([self.start, self.end], float)
+                    if not len(old):
+                        raise MorphologyError(
+                            f"{geom.name!r} is no capsule or cylinder, so it has no ends."
+                        )
+                    # The ends of a geom that is given by its pose have no order: match the nearest.
+                    here, turned = (np.linalg.norm(old - n, axis=1).sum() for n in (new, new[::-1]))
+                    if not geometry.has_ends(geom) and here > turned:
+                        old = old[::-1]
+                    geom.size = [geom.size[0], 0.0, 0.0]
+                    geometry.set_ends(geom, part_of_the_way(old, new, self.amount))
                 if self.middle is not None:
                     place, to = geometry.middle_of(geom), np.array(self.middle, float)
                     geometry.move_by(geom, part_of_the_way(place, to, self.amount) - place)
@@ -144,18 +152,6 @@ class PlaceGeom(Edit, frozen=True):
                             f"{geom.name!r} is no sphere, capsule or cylinder, so it has no radius."
                         )
                     geom.size[0] = part_of_the_way(geom.size[0], self.radius, self.amount)
-
-    def _place_ends(self, geom: mujoco.MjsGeom) -> None:
-        """Set both ends of the axis."""
-        old, new = geometry.axis_ends(geom), np.array([self.start, self.end], float)
-        if not len(old):
-            raise MorphologyError(f"{geom.name!r} is no capsule or cylinder, so it has no ends.")
-        # The ends of a geom that is given by its pose have no order: match the nearest.
-        here, turned = (np.linalg.norm(old - n, axis=1).sum() for n in (new, new[::-1]))
-        if not geometry.has_ends(geom) and here > turned:
-            old = old[::-1]
-        geom.size = [geom.size[0], 0.0, 0.0]
-        geometry.set_ends(geom, part_of_the_way(old, new, self.amount))
 
 
 class PlaceBody(Edit, frozen=True):

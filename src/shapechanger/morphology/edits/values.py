@@ -7,7 +7,6 @@ domain randomization, these are the operations `scale` and `abs`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, ClassVar, Final, Literal
 
 import mujoco
@@ -147,7 +146,13 @@ class Gear(ValueEdit, frozen=True):
                 factor = self.changed(1.0)
                 scale_strength(actuator, factor)
             factors[actuator.name] = factor
-        _scale_clamps(spec, factors)
+        # Without this, a stronger motor of a joint with `actuatorfrcrange` would have no effect.
+        driven = references.mentions(spec, "actuator")
+        for element in (*spec.joints, *spec.tendons):
+            own = references.key_of(element)
+            scales = {factors.get(each.holder.name, 1.0) for each in driven if each.element == own}
+            if len(scales) == 1:
+                element.actfrcrange *= abs(scales.pop())
 
 
 def _is_motor(actuator: mujoco.MjsActuator) -> bool:
@@ -178,20 +183,6 @@ def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
             "cannot be scaled: write new gains into the model instead."
         )
     actuator.forcerange *= factor
-
-
-def _scale_clamps(spec: mujoco.MjSpec, factors: Mapping[str, float]) -> None:
-    """Scale the largest force of the joints and tendons whose actuators have all become as strong.
-
-    Without it, a stronger motor of a joint with `actuatorfrcrange` would have no effect. The
-    factors are new forces over old ones, by the names of actuators.
-    """
-    driven = references.references(spec, "actuator")
-    for element in (*spec.joints, *spec.tendons):
-        own = references.key_of(element)
-        scales = {factors.get(each.holder.name, 1.0) for each in driven if each.element == own}
-        if len(scales) == 1:
-            element.actfrcrange *= abs(scales.pop())
 
 
 class _Resistance(ValueEdit, frozen=True, tag=None):

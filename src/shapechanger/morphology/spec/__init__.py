@@ -124,9 +124,6 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return copy.compile()
 
 
-# --- Values that the compiler would derive again -----------------------------------------------
-
-
 def make_explicit(spec: mujoco.MjSpec) -> None:
     """Name every element, and write out all values that the compiler would derive, in place.
 
@@ -187,11 +184,12 @@ def resolve_frames(spec: mujoco.MjSpec) -> None:
         return
     points = (*spec.geoms, *spec.sites, *spec.cameras, *spec.joints, *spec.lights)
     for element in (*spec.bodies[1:], *points):
-        if (frame := element.frame) is not None:
-            turn, shift = orientation(frame), np.array(frame.pos)
-            while (frame := frame.frame) is not None:
-                outer = orientation(frame)
-                turn, shift = product(outer, turn), frame.pos + rotation(outer) @ shift
+        around: Any = element.frame
+        if around is not None:
+            turn, shift = orientation(around), np.array(around.pos)
+            while (around := around.frame) is not None:
+                outer = orientation(around)
+                turn, shift = product(outer, turn), around.pos + rotation(outer) @ shift
             _resolve(element, turn, shift)
     for frame in spec.frames:
         frame.pos = np.zeros(3)

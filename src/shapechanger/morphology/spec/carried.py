@@ -17,14 +17,14 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.pose import CLOSED, close, equality_rows
 from shapechanger.morphology.spec import compiled, unique_namer
+from shapechanger.morphology.spec.closing import CLOSED, close, equality_rows
 from shapechanger.morphology.spec.geometry import (
+    OPPOSITE,
     UPRIGHT,
     Array,
     as_written,
     displace,
-    inverse,
     orientation,
     product,
     reference_of,
@@ -36,10 +36,13 @@ _J: Final = mujoco.mjtJoint
 _O: Final = mujoco.mjtObj
 _W: Final = mujoco.mjtWrap
 _D: Final = mujoco.mjtDisableBit
-_FREE, _BALL = int(_J.mjJNT_FREE), int(_J.mjJNT_BALL)
 _WITHOUT: Final = _D.mjDSBL_CONTACT | _D.mjDSBL_LIMIT | _D.mjDSBL_FRICTIONLOSS
 _MOST_STEPS: Final = 200
-_FIELDS: Final = ("qpos", "qvel", "act", "ctrl", "mpos", "mquat")
+# Fields of a keyframe, and of the data that they fill.
+_FIELDS: Final = {
+    **{field: field for field in ("qpos", "qvel", "act", "ctrl")},
+    **{"mpos": "mocap_pos", "mquat": "mocap_quat"},
+}
 # A tendon that is longer than its limit by less is within it, m or rad.
 _WITHIN: Final = 1e-6
 # Points of a closed loop coincide within this, m.
@@ -51,15 +54,14 @@ _STILL: Final = 1e-12
 @contextmanager
 def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
     """Take keyframes and pins out of the way of edits, yield the keyframes, and write all back."""
-    keyframes = Keyframes()
     loops = any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities)
     if not (spec.keys or spec.tendons or loops):
-        yield keyframes
+        yield Keyframes(spec, None)
         return
     for i, tendon in enumerate(spec.tendons):
         tendon.name = tendon.name or f"{MARK}tendon{i}"
     model = compiled(spec)
-    keyframes.take(spec, model)
+    keyframes = Keyframes(spec, model)
     tendons, torn = _tendons(model), set[Element]()
     if loops:
         _mark_pins(spec, model)
@@ -74,76 +76,65 @@ def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
     keyframes.put_back(spec)
 
 
-# --- Keyframes ---------------------------------------------------------------------------------
-
-
 class Keyframes:
-    """The keyframes of a specification, out of the way of its edits."""
+    """The keyframes of a specification, out of the way of its edits.
 
-    def __init__(self) -> None:
-        self._values: list[tuple[dict[str, Any], dict[str, dict[str, Array]]]] = []
+    Args:
+        spec: The specification, which loses them.
+        model: The model that it compiles to; not needed without keyframes.
+    """
 
-    def take(self, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-        """Take the keyframes out of a specification that compiles to the model."""
-        data = mujoco.MjData(model)
+    def __init__(self, spec: mujoco.MjSpec, model: Any) -> None:
+        # Name and time, the fields that are given, and numbers by field and name of an element.
+        self._values: list[tuple[dict[str, Any], list[str], dict[tuple[str, str], Array]]] = []
         for i, key in enumerate(list(spec.keys)):
+            data = mujoco.MjData(model)
             mujoco.mj_resetDataKeyframe(model, data, i)
-            numbers = _numbers(model, data)
-            values = {
-                field: {name: view.copy() for name, view in numbers[field].items()}
-                for field in _FIELDS
-                if len(getattr(key, field))
-            }
-            self._values.append(({"name": key.name, "time": key.time}, values))
+            given = [field for field in _FIELDS if len(getattr(key, field))]
+            numbers = _numbers(model, data).items()
+            values = {at: view.copy() for at, view in numbers if at[0] in given}
+            self._values.append(({"name": key.name, "time": key.time}, given, values))
             spec.delete(key)
 
     def copy(self, originals: Mapping[str, str]) -> None:
         """Give copied joints, actuators and bodies the values of their originals."""
-        for known in (known for _, values in self._values for known in values.values()):
-            known |= {new: known[old] for new, old in originals.items() if old in known}
+        for _, given, values in self._values:
+            pairs = [((f, new), (f, old)) for new, old in originals.items() for f in given]
+            values |= {new: values[old] for new, old in pairs if old in values}
 
     def change(self, joint: str, changed: Callable[[Array], Array]) -> None:
         """Change the position of a joint in every keyframe that gives positions.
 
         `changed` returns the new position (1, 4 or 7 numbers) from the old one.
         """
-        for _, values in self._values:
-            positions = values.get("qpos", {})
-            if joint in positions:
-                positions[joint] = changed(positions[joint])
+        for _, _, values in self._values:
+            if ("qpos", joint) in values:
+                values["qpos", joint] = changed(values["qpos", joint])
 
     def put_back(self, spec: mujoco.MjSpec) -> None:
         """Add the keyframes to the edited specification; new elements have their own pose."""
-        if not self._values:
-            return
-        model = compiled(spec)
-        for about, values in self._values:
-            data = mujoco.MjData(model)
-            numbers, key = _numbers(model, data), spec.add_key(**about)
-            for field, known in values.items():
-                for name, view in numbers[field].items():
-                    if name in known and known[name].size == view.size:
-                        view[:] = known[name]
-                own = {"mpos": "mocap_pos", "mquat": "mocap_quat"}.get(field, field)
-                setattr(key, field, getattr(data, own).ravel())
+        model: Any = compiled(spec) if self._values else None
+        for about, given, values in self._values:
+            data, key = mujoco.MjData(model), spec.add_key(**about)
+            for at, view in _numbers(model, data).items():
+                if at in values and values[at].size == view.size:
+                    view[:] = values[at]
+            for field in given:
+                setattr(key, field, getattr(data, _FIELDS[field]).ravel())
 
 
-def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, dict[str, Array]]:
-    """Return each element's numbers in `data`, keyed by field of a keyframe and by name."""
-    joints = [data.joint(i) for i in range(model.njnt)]
-    acts = zip(model.actuator_actadr, model.actuator_actnum, strict=True)
-    mocap = [(model.body(b).name, model.body_mocapid[b]) for b in range(model.nbody)]
-    return {
-        "qpos": {joint.name: joint.qpos for joint in joints},
-        "qvel": {joint.name: joint.qvel for joint in joints},
-        "act": {model.actuator(i).name: data.act[at : at + n] for i, (at, n) in enumerate(acts)},
-        "ctrl": {model.actuator(i).name: data.actuator(i).ctrl for i in range(model.nactuator)},
-        "mpos": {name: data.mocap_pos[i] for name, i in mocap if i >= 0},
-        "mquat": {name: data.mocap_quat[i] for name, i in mocap if i >= 0},
-    }
-
-
-# --- Tendons -----------------------------------------------------------------------------------
+def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[tuple[str, str], Array]:
+    """Return the elements' numbers in `data`, by field of a keyframe and name of the element."""
+    found: dict[tuple[str, str], Array] = {}
+    for joint in (data.joint(i) for i in range(model.njnt)):
+        found |= {("qpos", joint.name): joint.qpos, ("qvel", joint.name): joint.qvel}
+    for i, (at, n) in enumerate(zip(model.actuator_actadr, model.actuator_actnum, strict=True)):
+        name = model.actuator(i).name
+        found |= {("act", name): data.act[at : at + n], ("ctrl", name): data.actuator(i).ctrl}
+    for body in np.flatnonzero(model.body_mocapid >= 0).tolist():
+        name, i = model.body(body).name, model.body_mocapid[body]
+        found |= {("mpos", name): data.mocap_pos[i], ("mquat", name): data.mocap_quat[i]}
+    return found
 
 
 class _Tendon(NamedTuple):
@@ -161,17 +152,15 @@ def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
     found: dict[str, _Tendon] = {}
     for i in range(model.ntendon):
         inside: list[bool] = []
-        for j in range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]):
-            kind, side = model.wrap_type[j], int(model.wrap_prm[j])
-            if kind not in (int(_W.mjWRAP_SPHERE), int(_W.mjWRAP_CYLINDER)) or side < 0:
-                continue
-            geom = model.wrap_objid[j]
-            place = data.geom_xmat[geom].reshape(3, 3).T @ (
-                data.site_xpos[side] - data.geom_xpos[geom]
-            )
-            # A cylinder has no ends for a tendon.
-            reach = place[:2] if kind == _W.mjWRAP_CYLINDER else place
-            inside.append(bool(np.linalg.norm(reach) < model.geom_size[geom, 0]))
+        path = slice(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
+        wraps = (model.wrap_type[path], model.wrap_objid[path], model.wrap_prm[path].astype(int))
+        for kind, geom, side in zip(*wraps, strict=True):
+            if kind in (int(_W.mjWRAP_SPHERE), int(_W.mjWRAP_CYLINDER)) and side >= 0:
+                place = data.site_xpos[side] - data.geom_xpos[geom]
+                place = data.geom_xmat[geom].reshape(3, 3).T @ place
+                # A cylinder has no ends for a tendon.
+                reach = place[:2] if kind == _W.mjWRAP_CYLINDER else place
+                inside.append(bool(np.linalg.norm(reach) < model.geom_size[geom, 0]))
         length = float(data.ten_length[i])
         low, high = model.tendon_range[i]
         fits = not model.tendon_limited[i] or low - _WITHIN <= length <= high + _WITHIN
@@ -182,9 +171,8 @@ def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
 def _follow_tendons(spec: mujoco.MjSpec, tendons: dict[str, _Tendon]) -> None:
     """Refuse paths that mean something else now, and fit muscles to their new lengths."""
     new = _tendons(compiled(spec))
-    for name, old in tendons.items():
-        if (now := new.get(name)) is None:
-            continue
+    for name, now in new.items():
+        old = tendons.get(name, now)
         if old.inside != now.inside and len(old.inside) == len(now.inside):
             raise MorphologyError(
                 f"The tendon {name!r} would pass a geom on its other side, because its side "
@@ -202,14 +190,10 @@ def _follow_tendons(spec: mujoco.MjSpec, tendons: dict[str, _Tendon]) -> None:
         if tendon and muscle and old and np.any(actuator.lengthrange):
             # The method of musculoskeletal models that are fitted to a person: S. Delp and others,
             # OpenSim, IEEE Transactions on Biomedical Engineering 54(11), 2007.
-            longer = new[actuator.target].length / old.length
-            actuator.lengthrange = actuator.lengthrange * longer
+            actuator.lengthrange *= new[actuator.target].length / old.length
     for tendon in spec.tendons:
         if tendon.name.startswith(MARK):
             tendon.name = ""
-
-
-# --- Loops and couplings -----------------------------------------------------------------------
 
 
 def _mark_pins(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
@@ -242,7 +226,13 @@ def _close_loops(
         data.eq_active[i] &= key not in torn
     mujoco.mj_fwdPosition(model, data)
     lengths = np.array(data.ten_length)
-    if not _solve(model, data):
+    kinds = model.jnt_type
+    # The turn of a ball would be measured from the new pose.
+    driven = model.actuator_trnid[np.isin(model.actuator_trntype, [int(t) for t in OF_JOINTS]), 0]
+    measured = (model.jnt_limited != 0) | (model.jnt_stiffness != 0.0)
+    measured |= np.isin(np.arange(model.njnt), driven)
+    still = (kinds == int(_J.mjJNT_FREE)) | ((kinds == int(_J.mjJNT_BALL)) & measured)
+    if close(model, data, ~still[model.dof_jntid], _MOST_STEPS) > CLOSED:
         (_, name), gap = max(_residuals(spec, model, data).items(), key=lambda item: item[1])
         equality = next(e for e in spec.equalities if e.name1 == name)
         names = [equality.name1, equality.name2]
@@ -264,7 +254,7 @@ def _close_loops(
             if np.abs(turn - UPRIGHT).max() > _STILL:
                 moved = True
                 displace(joint, turn)
-                keyframes.change(joint.name, lambda pose, turn=turn: product(inverse(turn), pose))
+                keyframes.change(joint.name, lambda pose, turn=turn: product(OPPOSITE * turn, pose))
         elif joint.type != _J.mjJNT_FREE and abs(by) > _STILL:
             moved = True
             displace(joint, by)
@@ -291,7 +281,7 @@ def _unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
             own[:3] = second.pos
             if own[6:10].any() or not (together and np.allclose(a.xmat, b.xmat, 0.0, _TOGETHER)):
                 own[3:6] = first.pos
-                own[6:10] = product(orientation(first), inverse(orientation(second)))
+                own[6:10] = product(orientation(first), OPPOSITE * orientation(second))
         elif together:
             own[:3] = first.pos
         else:  # One that is switched off, and open: only sites can state both places.
@@ -326,20 +316,11 @@ def _residuals(
 ) -> dict[Element, float]:
     """Return by how much each active equality is open, m or rad."""
     found, keys = dict[Element, float](), _keys(spec)
-    for row, gap in zip(*equality_rows(model, data)[:2], strict=True):
-        found[keys[row]] = max(found.get(keys[row], 0.0), float(abs(gap)))
+    rows, gaps, _ = equality_rows(model, data)
+    for row, gap in zip(rows, gaps, strict=True):
+        key = keys[int(row)]
+        found[key] = max(found.get(key, 0.0), float(abs(gap)))
     return found
-
-
-def _solve(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Move the joints to the nearest pose in which the equalities hold; return whether there is."""
-    kinds = model.jnt_type
-    # The turn of a ball would be measured from the new pose.
-    driven = model.actuator_trnid[np.isin(model.actuator_trntype, [int(t) for t in OF_JOINTS]), 0]
-    measured = (model.jnt_limited != 0) | (model.jnt_stiffness != 0.0)
-    measured |= np.isin(np.arange(model.njnt), driven)
-    still = (kinds == _FREE) | ((kinds == _BALL) & measured)
-    return close(model, data, ~still[model.dof_jntid], _MOST_STEPS) <= CLOSED
 
 
 def _shift_coupling(equality: mujoco.MjsEquality, changes: dict[Element, float]) -> None:

@@ -22,6 +22,8 @@ _J: Final = mujoco.mjtJoint
 _L: Final = mujoco.mjtLimited
 LONG: Final = (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER)
 UPRIGHT: Final = np.array([1.0, 0.0, 0.0, 0.0])
+OPPOSITE: Final = np.array([1.0, -1.0, -1.0, -1.0])
+"""Factors that make the quaternion of the opposite turn."""
 _QUAT: Final = mujoco.mjtOrientation.mjORIENTATION_QUAT
 # The method needs any specification, even an empty one.
 _RESOLVER: Final = mujoco.MjSpec()
@@ -35,9 +37,6 @@ _ALONG: Final = 0.999
 _SAME: Final = 1e-9
 
 
-# --- Turns -------------------------------------------------------------------------------------
-
-
 def rotation(quaternion: Array) -> Array:
     """Return the rotation matrix, shape (3, 3), of a quaternion."""
     matrix = np.empty(9)
@@ -49,13 +48,6 @@ def product(first: Array, second: Array) -> Array:
     """Return the quaternion of a second turn, made in the frame that the first has turned."""
     result = np.empty(4)
     mujoco.mju_mulQuat(result, first, second)
-    return result
-
-
-def inverse(quaternion: Array) -> Array:
-    """Return the quaternion of the opposite turn."""
-    result = np.empty(4)
-    mujoco.mju_negQuat(result, quaternion)
     return result
 
 
@@ -78,9 +70,6 @@ def set_orientation(element: Any, quaternion: Array) -> None:
     """Set an element's quaternion, and drop any other form of its orientation."""
     element.quat = quaternion
     element.alt.type = _QUAT
-
-
-# --- Geoms and points --------------------------------------------------------------------------
 
 
 def has_ends(element: Any) -> bool:
@@ -180,9 +169,6 @@ def resize_geom(geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
         move_outwards(geom, held, factor)
 
 
-# --- Segments ----------------------------------------------------------------------------------
-
-
 def anchor(body: mujoco.MjsBody) -> Array:
     """Return the anchor of a segment: where its first hinge or ball holds it, or its origin."""
     turning = (_J.mjJNT_HINGE, _J.mjJNT_BALL)
@@ -272,9 +258,6 @@ def carry_outwards(body: mujoco.MjsBody, held: Array, factor: float | Array) -> 
         child.pos += stretched(held_there, held, factor) - held_there
 
 
-# --- Joints ------------------------------------------------------------------------------------
-
-
 def is_limited(element: mujoco.MjsJoint | mujoco.MjsTendon) -> bool:
     """Return whether a joint or tendon has limits."""
     automatic = element.limited == _L.mjLIMITED_AUTO and element.range[0] < element.range[1]
@@ -342,9 +325,6 @@ def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
     parent = orientation(body)
     body.pos = body.pos + rotation(parent) @ shift
     set_orientation(body, product(parent, quaternion))
-
-
-# --- Cuts --------------------------------------------------------------------------------------
 
 
 class NearPart(NamedTuple):

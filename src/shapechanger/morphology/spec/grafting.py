@@ -5,30 +5,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.spec import require_free_name, resolve_frames
-from shapechanger.morphology.spec.geometry import (
-    has_ends,
-    orientation,
-    product,
-    rotation,
-)
-from shapechanger.morphology.spec.references import (
-    COUPLINGS,
-    elements_of,
-    elements_on,
-    key_of,
-    kind_of,
-    path_of,
-    references,
-    release_drawings,
-    subtree,
-)
+from shapechanger.morphology.spec import geometry, references, require_free_name, resolve_frames
 
 _O: Final = mujoco.mjtObj
 _W: Final = mujoco.mjtWrap
@@ -46,7 +29,7 @@ def copy_element(spec: mujoco.MjSpec, element: Any, place: Any, name: str) -> An
     A body is copied without what hangs on it, a tendon without its path. The copy is added to
     `place`, a body or frame, or for an element on no body to `spec`.
     """
-    kind = kind_of(element)
+    kind = references.kind_of(element)
     if name:
         require_free_name(spec, kind, name)
     if hasattr(element, "plugin") and element.plugin.active:
@@ -55,9 +38,9 @@ def copy_element(spec: mujoco.MjSpec, element: Any, place: Any, name: str) -> An
     for field in _fields_of(element.__class__):
         setattr(copy, field, getattr(element, field))
     if hasattr(element, "quat"):
-        copy.quat = orientation(element)
+        copy.quat = geometry.orientation(element)
     if isinstance(element, mujoco.MjsBody):
-        copy.iquat = orientation(element, "iquat", "ialt")
+        copy.iquat = geometry.orientation(element, "iquat", "ialt")
     # Limits of attached models can have other units than the limits of added elements.
     turns = isinstance(element, mujoco.MjsJoint) and element.type != mujoco.mjtJoint.mjJNT_SLIDE
     if turns and element.compiler.degree != copy.compiler.degree:
@@ -75,15 +58,13 @@ def _fields_of(kind: type) -> tuple[str, ...]:
     return tuple(name for name in settable if name not in _APART)
 
 
-def _copy_body(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, place: Any, renamed: Callable[[str], str]
-) -> mujoco.MjsBody:
-    """Copy a body with all that hangs on it."""
-    copy = copy_element(spec, body, place, renamed(body.name))
-    for element in elements_on(body):
-        copy_element(spec, element, copy, element.name and renamed(element.name))
-    for child in body.bodies:
-        _copy_body(spec, child, copy, renamed)
+def _copy_whole(
+    spec: mujoco.MjSpec, element: Any, place: Any, renamed: Callable[[str], str]
+) -> Any:
+    """Copy an element with all that hangs on it."""
+    copy = copy_element(spec, element, place, element.name and renamed(element.name))
+    for part in references.parts_of(element):
+        _copy_whole(spec, part, copy, renamed)
     return copy
 
 
@@ -93,14 +74,9 @@ def move(spec: mujoco.MjSpec, element: Any, parent: mujoco.MjsBody) -> Any:
     The new element is returned; the old handle is invalid.
     """
     # References are by name, so renamed old elements lose them.
-    if isinstance(element, mujoco.MjsBody):
-        for body in subtree(element):
-            for each in (body, *elements_on(body)):
-                each.name += _OLD
-        moved = _copy_body(spec, element, parent, lambda name: name.removesuffix(_OLD))
-    else:
-        name, element.name = element.name, element.name + _OLD
-        moved = copy_element(spec, element, parent, name)
+    for each in references.whole(element):
+        each.name += _OLD
+    moved = _copy_whole(spec, element, parent, lambda name: name.removesuffix(_OLD))
     spec.delete(element)
     return moved
 
@@ -112,9 +88,9 @@ def share_contacts(
 
     `cut` has the names of the farther halves of geoms by the names of the nearer ones.
     """
-    halves = {key_of(body): part.name}
+    halves = {references.key_of(body): part.name}
     halves |= {(_O.mjOBJ_GEOM, near): far for near, far in cut.items()}
-    for mention in references(spec, "exclude", "pair"):
+    for mention in references.mentions(spec, "exclude", "pair"):
         if far := halves.get(mention.element):
             name = mention.holder.name and f"{mention.holder.name}_of_{part.name}"
             setattr(copy_element(spec, mention.holder, spec, name), mention.field, far)
@@ -130,12 +106,12 @@ def copy_limb(
     the suffix. The turn is about the z axis of the limb's parent, rad. The first body is returned.
     """
     turn = np.array([math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
-    inside, parent = elements_of(limb), limb.parent
+    inside, parent = references.elements_of(limb), limb.parent
     # Done before the copy exists, because its cameras name elements too.
-    mentions = references(spec)
+    mentions = references.mentions(spec)
     turned: set[tuple[mujoco.mjtObj, str]] = set()
-    release_drawings(spec, inside, skins=False)
-    first = _copy_body(spec, limb, parent.add_frame(quat=turn), lambda name: name + suffix)
+    references.release_drawings(spec, inside, skins=False)
+    first = _copy_whole(spec, limb, parent.add_frame(quat=turn), lambda name: name + suffix)
     resolve_frames(spec)
 
     def name_of(kind: mujoco.mjtObj, name: str) -> str:
@@ -150,10 +126,9 @@ def copy_limb(
         point = finders[kind](name) if kind in finders else None
         if point is None or point.parent != parent or parent.parent is None:
             return name
-        copy, matrix = copy_element(spec, point, parent, new), rotation(turn)
-        if has_ends(copy):
-            copy.fromto = (copy.fromto.reshape(2, 3) @ matrix.T).ravel()
-        copy.pos, copy.quat = matrix @ copy.pos, product(turn, copy.quat)
+        copy = copy_element(spec, point, parent, new)
+        geometry.set_points(copy, geometry.points_of(copy) @ geometry.rotation(turn).T)
+        copy.quat = geometry.product(turn, copy.quat)
         if kind == _O.mjOBJ_GEOM:  # A tendon bends around it; that needs no second mass.
             copy.mass, copy.contype, copy.conaffinity = 0.0, 0, 0
         turned.add((kind, name))
@@ -161,33 +136,33 @@ def copy_limb(
 
     # Sensors last: they may name the others.
     holders = (*spec.tendons, *spec.equalities, *spec.excludes, *spec.pairs)
-    for holder in (*holders, *spec.actuators, *spec.sensors):
+    for holder in cast("list[Any]", [*holders, *spec.actuators, *spec.sensors]):
         own = [mention for mention in mentions if mention.holder == holder]
         # An actuator with only its other end on the limb moves another limb.
-        moves = [m for m in own if kind_of(holder) != "actuator" or m.field != "refsite"]
+        moves = (m for m in own if m.kind != "actuator" or m.field != "refsite")
         if not any(mention.element in inside for mention in moves):
             continue
-        if isinstance(holder, mujoco.MjsEquality):
-            leader, follower = holder.name2, holder.name1
-            if (coupled := COUPLINGS.get(holder.type)) and (coupled, follower) not in inside:
-                raise MorphologyError(
-                    f"{follower!r} follows {leader!r}, and cannot follow a copy of it too: copy a "
-                    "limb that holds both."
-                )
+        is_equality = isinstance(holder, mujoco.MjsEquality)
+        coupled = is_equality and references.COUPLINGS.get(holder.type)
+        if coupled and (coupled, holder.name1) not in inside:
+            raise MorphologyError(
+                f"{holder.name1!r} follows {holder.name2!r}, and cannot follow a copy of it too: "
+                "copy a limb that holds both."
+            )
         copy = copy_element(spec, holder, spec, holder.name and holder.name + suffix)
         if isinstance(holder, mujoco.MjsTendon):
             _copy_path(holder, copy, name_of)
             own = []
         for mention in own:
             kind, name = mention.element
-            if isinstance(holder, mujoco.MjsEquality | mujoco.MjsActuator):
+            if is_equality or isinstance(holder, mujoco.MjsActuator):
                 name = name_of(kind, name)
             elif mention.element in inside:
                 name += suffix
             setattr(copy, mention.field, name)
-        inside.add(key_of(holder))
+        inside.add(references.key_of(holder))
     for mention in mentions:
-        aims = mention.kind in ("camera", "light") and key_of(mention.holder) in inside
+        aims = mention.kind in ("camera", "light") and references.key_of(mention.holder) in inside
         if aims and mention.element in inside:
             copy = getattr(spec, mention.kind)(mention.holder.name + suffix)
             copy.targetbody = mention.element[1] + suffix
@@ -198,7 +173,7 @@ def _copy_path(
     tendon: mujoco.MjsTendon, copy: mujoco.MjsTendon, name_of: Callable[[mujoco.mjtObj, str], str]
 ) -> None:
     """Give a copy the path of a tendon, along the copies of its elements."""
-    for wrap in path_of(tendon):
+    for wrap in references.path_of(tendon):
         match wrap.type:
             case _W.mjWRAP_PULLEY:
                 copy.wrap_pulley(wrap.divisor)

@@ -43,13 +43,23 @@ _WRAPS: Final = {
     **{_W.mjWRAP_JOINT: _JOINT, _W.mjWRAP_SITE: _SITE},
     **dict.fromkeys((_W.mjWRAP_SPHERE, _W.mjWRAP_CYLINDER), _GEOM),
 }
+
+
+def _end_of(equality: Any) -> mujoco.mjtObj | None:
+    return equality.objtype if equality.type in PINS else COUPLINGS.get(equality.type)
+
+
+def _target_of(actuator: Any) -> mujoco.mjtObj | None:
+    return _TARGETS.get(actuator.trntype)
+
+
 # Lists of elements that name others, their fields with names, and the kind of the named elements
 # or a function that returns it; a tuple has one kind for each name.
 _HOLDERS: Final[tuple[tuple[str, str, Any], ...]] = (
-    ("equalities", "name1 name2", lambda e: e.objtype if e.type in PINS else COUPLINGS.get(e.type)),
+    ("equalities", "name1 name2", _end_of),
     ("excludes", "bodyname1 bodyname2", _BODY),
     ("pairs", "geomname1 geomname2", _GEOM),
-    ("actuators", "target", lambda actuator: _TARGETS.get(actuator.trntype)),
+    ("actuators", "target", _target_of),
     ("actuators", "refsite slidersite", _SITE),
     ("sensors", "objname", attrgetter("objtype")),
     ("sensors", "refname", attrgetter("reftype")),
@@ -86,7 +96,7 @@ class Mention(NamedTuple):
         return f"the {self.kind}" if name.startswith(MARK) else f"the {self.kind} of {name!r}"
 
 
-def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
+def mentions(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     """Return every reference to an element of a body, a tendon or an actuator.
 
     `kinds` such as "actuator" are the holders', by default all.
@@ -98,11 +108,11 @@ def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     ]
     for elements, fields, kind in _HOLDERS:
         for holder in getattr(spec, elements):
-            of = kind(holder) if callable(kind) else kind
+            of: Any = kind(holder) if callable(kind) else kind
             for field in fields.split():
                 names = getattr(holder, field)
                 names = [names] if isinstance(names, str) else list(names)
-                each = list(of) if isinstance(holder, mujoco.MjsTuple) else [of] * len(names)
+                each: list[Any] = list(of) if kind_of(holder) == "tuple" else [of] * len(names)
                 keys = ((_plain(k), name) for k, name in zip(each, names, strict=True))
                 found += [Mention(holder, field, key) for key in keys if key[1]]
     return [mention for mention in found if not kinds or mention.kind in kinds]
@@ -111,9 +121,6 @@ def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
 def _plain(kind: Any) -> mujoco.mjtObj:
     """Return a body for either frame of a body, which sensors distinguish."""
     return _BODY if kind == _O.mjOBJ_XBODY else _O(kind or 0)
-
-
-# --- Kinds, limbs and paths --------------------------------------------------------------------
 
 
 def kind_of(element: Any) -> str:
@@ -126,21 +133,22 @@ def key_of(element: Any) -> Element:
     return getattr(_O, f"mjOBJ_{kind_of(element).upper()}"), element.name
 
 
-def subtree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
-    """Yield a body and its descendants, parents first."""
-    yield body
-    for child in body.bodies:
-        yield from subtree(child)
+def parts_of(element: Any) -> list[Any]:
+    """Return all that hangs on a body itself, limbs last; nothing hangs on other elements."""
+    kinds = ("joints", "geoms", "sites", "cameras", "lights", "bodies")
+    return [part for kind in kinds for part in getattr(element, kind, ())]
 
 
-def elements_on(body: mujoco.MjsBody) -> list[Any]:
-    """Return the joints, geoms, sites, cameras and lights of a body."""
-    return [*body.joints, *body.geoms, *body.sites, *body.cameras, *body.lights]
+def whole(element: Any) -> Iterator[Any]:
+    """Yield an element and, of a limb, all that hangs on it, parents first."""
+    yield element
+    for part in parts_of(element):
+        yield from whole(part)
 
 
 def elements_of(limb: mujoco.MjsBody) -> set[Element]:
     """Return all elements of a limb."""
-    return {key_of(each) for body in subtree(limb) for each in (body, *elements_on(body))}
+    return {key_of(each) for each in whole(limb)}
 
 
 def path_of(tendon: mujoco.MjsTendon) -> list[Any]:
@@ -179,22 +187,19 @@ def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
     acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss
     if is_limited(tendon) or acts or tendon.armature:
         return True
-    return any(each.element == key_of(tendon) for each in references(spec))
-
-
-# --- Elements that change or go ----------------------------------------------------------------
+    return any(each.element == key_of(tendon) for each in mentions(spec))
 
 
 def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool = True) -> None:
     """Remove the skins over bodies that change, without effect, and refuse parts of a flex."""
-    mentions = [each for each in references(spec, "flex", "skin") if each.element in touched]
-    for mention in mentions:
+    found = [each for each in mentions(spec, "flex", "skin") if each.element in touched]
+    for mention in found:
         if mention.kind == "flex":
             raise MorphologyError(
                 f"{mention.element[1]!r} carries a part of {mention}, which would not follow: "
                 "remove the flex first."
             )
-    for skin in {each.holder.name: each.holder for each in mentions if skins}.values():
+    for skin in {each.holder.name: each.holder for each in found if skins}.values():
         spec.delete(skin)
 
 
@@ -203,7 +208,7 @@ def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str
 
     `why` ends the sentence on the element, such as "lies beyond the cut".
     """
-    for mention in references(spec, *kinds):
+    for mention in mentions(spec, *kinds):
         if mention.element == element:
             # The place of a pin has no name.
             name = "A pin" if element[1].startswith(MARK) else repr(element[1])
@@ -216,7 +221,7 @@ def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[s
     """Refuse to split a segment if elements refer to it, or to a geom that would be `cut`."""
     for name in cut:
         require_unnamed(spec, (_GEOM, name), "would be cut in two", "tendon", "sensor")
-    for mention in references(spec, "actuator", "sensor"):
+    for mention in mentions(spec, "actuator", "sensor"):
         whole = mention.kind == "actuator" or mention.holder.type in _OF_ALL_GEOMS
         if whole and mention.element == key_of(body):
             raise MorphologyError(
@@ -298,7 +303,7 @@ def remove_joint(
                 "be removed alone."
             )
         spec.delete(tendon)
-    for mention in references(spec, "actuator", "sensor"):  # Sensors may name the actuators.
+    for mention in mentions(spec, "actuator", "sensor"):  # Sensors may name the actuators.
         if mention.element in gone:
             gone.add(key_of(mention.holder))
             spec.delete(mention.holder)
