@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import ctypes.util
 import os
 import sys
@@ -20,9 +19,6 @@ _OTHER_VALUES: Final = (
     *("disable", "disabled", "off", "false", "0"),
 )
 
-# From the Khronos registry: EGL_EXT_platform_device.
-_EGL_PLATFORM_DEVICE_EXT: Final = 0x313F
-_MOST_DEVICES: Final = 16
 _PROBE: Final = 16  # Width and height of a window that is only a test, pixels.
 
 
@@ -34,11 +30,7 @@ def has_screen() -> bool:
 
 
 def require_screen() -> None:
-    """Require that a window can be opened; GLFW would end the process otherwise.
-
-    Raises:
-        RenderError: If there is no screen, or no window opens.
-    """
+    """Raise a RenderError unless a window opens; GLFW would end the process otherwise."""
     if not has_screen():
         raise RenderError(
             "There is no screen to open a window on: make the env with render_mode='rgb_array', "
@@ -51,30 +43,25 @@ def choose_gl() -> None:
     """Set `MUJOCO_GL` to EGL or OSMesa if there is no screen and it is not set.
 
     Raises:
-        RenderError: If neither works, or it is set to a value with which nothing is drawn.
+        RenderError: If neither is installed, or it is set to a value with which nothing is drawn.
     """
     chosen = os.environ.get("MUJOCO_GL", "")
     if chosen and chosen not in _LIBRARIES:
         raise _no_library(chosen)
     if chosen or has_screen():
         return
-    if _egl_works():
-        os.environ["MUJOCO_GL"] = "egl"
-    elif ctypes.util.find_library("OSMesa"):
-        os.environ["MUJOCO_GL"] = "osmesa"
-    else:
+    installed = {"egl": "EGL", "osmesa": "OSMesa"}
+    found = [name for name in installed if ctypes.util.find_library(installed[name])]
+    if not found:
         raise RenderError(
-            "There is no screen, and neither EGL nor OSMesa works: on Debian or "
+            "There is no screen, and neither EGL nor OSMesa is installed: on Debian or "
             "Ubuntu run `apt-get install libegl1 libgl1-mesa-dri`, or libosmesa6."
         )
+    os.environ["MUJOCO_GL"] = found[0]
 
 
 def require_known_gl() -> None:
-    """Require a `MUJOCO_GL` with which MuJoCo can be imported.
-
-    Raises:
-        RenderError: If it has an unknown value.
-    """
+    """Raise a RenderError unless MuJoCo can be imported with the value of `MUJOCO_GL`."""
     chosen = os.environ.get("MUJOCO_GL", "").lower().strip()
     if chosen not in (*_LIBRARIES, *_OTHER_VALUES):
         raise _no_library(chosen)
@@ -136,30 +123,3 @@ def _require_glfw() -> None:
 
 def _first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
-
-
-def _egl_works() -> bool:
-    """Return whether some EGL device opens; a library without a driver does not."""
-    name = ctypes.util.find_library("EGL")
-    try:
-        egl = ctypes.CDLL(name) if name else None
-    except OSError:  # Built for another machine.
-        egl = None
-    if egl is None:
-        return False
-    egl.eglGetProcAddress.restype = ctypes.c_void_p
-    query = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
-    get_display = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
-    if not query or not get_display:
-        return False
-    pointer, integer, count = ctypes.c_void_p, ctypes.c_uint, ctypes.c_int(0)
-    devices = (pointer * _MOST_DEVICES)()
-    # Prototypes of the Khronos registry; without them pointers would be cut to 32 bits.
-    query_devices = ctypes.CFUNCTYPE(integer, ctypes.c_int, pointer, pointer)(query)
-    platform_display = ctypes.CFUNCTYPE(pointer, integer, pointer, pointer)(get_display)
-    egl.eglInitialize.argtypes = [pointer, pointer, pointer]
-    found = query_devices(_MOST_DEVICES, devices, ctypes.addressof(count))
-    return bool(found) and any(
-        egl.eglInitialize(platform_display(_EGL_PLATFORM_DEVICE_EXT, device, None), None, None)
-        for device in devices[: count.value]
-    )
