@@ -10,9 +10,9 @@ Four parts of MuJoCo's step take time without changing any number of an ant or a
 - **Collisions** of models without possible collisions, such as a pendulum.
 - **Springs, joint friction, sensors and equalities** of a model that has none.
 
-Two checks decide which of these may be left out: rules on the model, which keep every pair that the
+Two checks decide whether they are left out: rules on the model, which keep every pair that the
 original could ever generate, and then a test that steps both models side by side. A model for which
-either fails keeps its contact search, or has no fast model at all.
+either fails has no fast model.
 """
 
 from __future__ import annotations
@@ -31,14 +31,9 @@ from shapechanger.morphology.certificate.numbers import (
     mixed_parameters,
 )
 
-_Ints = NDArray[np.int64]
-
 _BIT: Final = mujoco.mjtDisableBit
-_NO_ISLANDS: Final = int(_BIT.mjDSBL_ISLAND)
-_NO_SEARCH: Final = int(_BIT.mjDSBL_MIDPHASE)
-_NO_CONTACTS: Final = int(_BIT.mjDSBL_CONTACT)
 # Elements that could split one tree into islands, or that the rules do not cover.
-_UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhfield")
+_UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhfield", "npair")
 
 
 def find_fast_model(
@@ -61,89 +56,69 @@ def find_fast_model(
         or mujoco.get_mjcb_contactfilter() is not None
     ):
         return None
-    without_search = _without_search(model, make_spec)
-    if without_search is not None and moves_equally(model, without_search):
-        return without_search
-    without_islands = _disabled(copy.copy(model), _NO_ISLANDS)
-    return without_islands if moves_equally(model, without_islands) else None
-
-
-def _disabled(model: mujoco.MjModel, flags: int) -> mujoco.MjModel:
-    """Set disable flags of a model, including flags for the features that it lacks; return it."""
+    _, pairs = colliding_pairs(model)
+    fast = _with_pairs(model, make_spec(), pairs) if pairs.size else copy.copy(model)
+    if fast is None:
+        return None
+    flags = [_BIT.mjDSBL_ISLAND, _BIT.mjDSBL_MIDPHASE, _BIT.mjDSBL_EQUALITY]
+    if not pairs.size:
+        flags.append(_BIT.mjDSBL_CONTACT)
     # If both springs and dampers are disabled, MuJoCo skips all other passive forces too, such as
     # fluid forces.
     has_dampers = not model.opt.disableflags & int(_BIT.mjDSBL_DAMPER)
-    has_springs = model.jnt_stiffness.any() or model.jnt_stiffnesspoly.any()
-    flags |= int(_BIT.mjDSBL_EQUALITY)
-    if has_dampers and not has_springs:
-        flags |= int(_BIT.mjDSBL_SPRING)
+    if has_dampers and not (model.jnt_stiffness.any() or model.jnt_stiffnesspoly.any()):
+        flags.append(_BIT.mjDSBL_SPRING)
     if not model.dof_frictionloss.any():
-        flags |= int(_BIT.mjDSBL_FRICTIONLOSS)
+        flags.append(_BIT.mjDSBL_FRICTIONLOSS)
     if not model.nsensor:
-        flags |= int(_BIT.mjDSBL_SENSOR)
-    model.opt.disableflags |= flags
-    return model
+        flags.append(_BIT.mjDSBL_SENSOR)
+    fast.opt.disableflags |= sum(map(int, flags))
+    return fast if moves_equally(model, fast) else None
 
 
-def _without_search(
-    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
+def _with_pairs(
+    model: mujoco.MjModel, spec: mujoco.MjSpec, pairs: NDArray[np.int64]
 ) -> mujoco.MjModel | None:
-    """Return the model without islands and with all possible contacts as explicit pairs."""
-    if model.npair:
-        return None
-    _, pairs = colliding_pairs(model)
-    if not pairs.size:
-        return _disabled(copy.copy(model), _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS)
-    names = [model.geom(geom).name for geom in range(model.ngeom)]
-    if not _on_one_floor(model, pairs) or not all(names):
-        return None
-    spec = make_spec()
-    for first, second in pairs.tolist():
-        cast("Any", spec).add_pair(geomname1=names[first], geomname2=names[second])
-    result = spec.compile()
-    if not _same_but_for_pairs(model, result):
-        return None
-    joined = geoms_of_pairs(result)
-    for parameter, values in mixed_parameters(result, joined).items():
-        getattr(result, f"pair_{parameter}")[:] = values
-    # Exclude all geoms from the search, by their bits and by the bits of their bodies.
-    result.geom_contype[:] = result.geom_conaffinity[:] = 0
-    result.body_contype[:] = result.body_conaffinity[:] = 0
-    return _disabled(result, _NO_ISLANDS | _NO_SEARCH)
+    """Return the model with all possible contacts as explicit pairs, and without a search.
 
-
-def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
-    """Return whether each pair joins one fixed geom with the only geom of a body.
-
-    The order of the pairs then follows from the order of the bodies.
+    Each pair must join one fixed geom with the only geom of a body: the order of the pairs then
+    follows from the order of the bodies.
     """
-    bodies = model.geom_bodyid[pairs]
+    names = [model.geom(geom).name for geom in range(model.ngeom)]
+    bodies, involved = model.geom_bodyid[pairs], np.unique(pairs)
     fixed = model.body_weldid[bodies] == 0
-    floor = np.unique(pairs[fixed])
     moving = bodies[~fixed]
-    involved = np.unique(pairs)
-    return bool(
-        (fixed.sum(axis=1) == 1).all()
-        and floor.size == 1
+    if not (
+        all(names)
+        and (fixed.sum(axis=1) == 1).all()
+        and np.unique(pairs[fixed]).size == 1
         and np.unique(moving).size == moving.size
         and np.unique(model.geom_priority[involved]).size == 1
         and not model.geom_adhesion[involved].any()
         and not model.geom_surfacevel[involved].any()
-    )
-
-
-def _same_but_for_pairs(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
-    """Return whether two models have the same numbers, except names and pairs."""
-    own = [name for name in dir(model) if not name.startswith(("pair_", "name", "_"))]
-    names = [name for name in own if type(getattr(model, name)) is np.ndarray]
-    return all(np.array_equal(getattr(model, name), getattr(other, name)) for name in names)
+    ):
+        return None
+    for first, second in pairs.tolist():
+        cast("Any", spec).add_pair(geomname1=names[first], geomname2=names[second])
+    result = spec.compile()
+    for name in dir(model):  # Only names and pairs may differ.
+        value = getattr(model, name)
+        is_array = type(value) is np.ndarray and not name.startswith(("pair_", "name", "_"))
+        if is_array and not np.array_equal(value, getattr(result, name)):
+            return None
+    for parameter, values in mixed_parameters(result, geoms_of_pairs(result)).items():
+        getattr(result, f"pair_{parameter}")[:] = values
+    # Exclude all geoms from the search, by their bits and by the bits of their bodies.
+    result.geom_contype[:] = result.geom_conaffinity[:] = 0
+    result.body_contype[:] = result.body_conaffinity[:] = 0
+    return result
 
 
 # Fields that must be equal after every step; they include everything that the next step uses.
 _FIELDS: Final = (
     *("time", "qpos", "qvel", "act", "qacc", "qacc_warmstart", "qfrc_constraint", "xpos", "xquat"),
-    *("qfrc_passive", "qfrc_spring", "qfrc_damper", "geom_xpos", "cinert", "cvel", "cfrc_ext"),
-    *("cfrc_int", "cacc", "actuator_force", "sensordata", "ncon", "nefc"),
+    *("qfrc_passive", "geom_xpos", "cinert", "cvel", "cfrc_ext", "cfrc_int", "cacc", "sensordata"),
+    *("actuator_force", "ncon", "nefc"),
 )
 _OF_CONTACTS: Final = (
     *("geom", "dist", "pos", "frame", "includemargin", "friction", "solref", "solreffriction"),
@@ -155,18 +130,18 @@ _STEPS: Final = 8
 _SEED: Final = 20170706
 # Spread of random poses, as a fraction of a joint's range, or rad and m without one; and standard
 # deviation of velocities, rad/s and m/s.
-_POSE_NOISE: Final = 0.5
+_POSE: Final = 0.5
 _SPEED: Final = 3.0
-# Depth of the trunk below the floor, so that every geom touches it, m.
+# Depth of the trunk below the floor, so that every geom touches it, and height of a throw, m.
 _SUNK_M: Final = 0.02
+_THROWN_M: Final = 0.4
 
 
 def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
     """Return whether two models move equally, to the last bit, from several starts.
 
-    In some starts the trunk is in the air, in others it is thrown, turned over or sunk into the
-    floor, so that geoms touch it and joints reach their limits. Where the contact search differs,
-    every pair that can collide must have touched.
+    In some starts the trunk is thrown and turned over, in others sunk into the floor, so that geoms
+    touch it and joints reach their limits. Every pair that can collide must have touched.
 
     Args:
         model: The original model.
@@ -174,56 +149,36 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
     """
     rng = np.random.default_rng(_SEED)
     one, two = mujoco.MjData(model), mujoco.MjData(model)
-    touched: set[tuple[int, int]] = set()
+    touched: set[tuple[int, ...]] = set()
+    axes = np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE))
     for start in range(_STARTS):
-        pose, speed = _drawn(model, rng, start)
+        pose, speed = model.qpos0.copy(), np.zeros(model.nv)
+        if start:
+            speed = _SPEED * rng.standard_normal(model.nv)
+            spans = np.where(model.jnt_limited[axes], np.ptp(model.jnt_range[axes], axis=1), 2.0)
+            pose[model.jnt_qposadr[axes]] += spans * rng.uniform(-_POSE, _POSE, spans.size)
+            for at in model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]:
+                if start % 2:  # Sunk: every geom level with the trunk touches.
+                    pose[at + 2] = -_SUNK_M * start
+                else:
+                    pose[at + 2 : at + 7] = _THROWN_M, *rng.standard_normal(4)
+            mujoco.mj_normalizeQuat(model, pose)
         for data in (one, two):
             mujoco.mj_resetData(model, data)
-            data.qpos[:] = pose
-            data.qvel[:] = speed
+            data.qpos[:], data.qvel[:] = pose, speed
             mujoco.mj_forward(model, data)  # With the original model, as in a reset.
         for _ in range(_STEPS):
             action = rng.uniform(-1.0, 1.0, model.nu)
-            one.ctrl[:] = two.ctrl[:] = action
-            mujoco.mj_step(model, one)
-            mujoco.mj_step(other, two)
-            mujoco.mj_rnePostConstraint(model, one)
-            mujoco.mj_rnePostConstraint(other, two)
-            if not (_same(one, two, _FIELDS) and _same(one.contact, two.contact, _OF_CONTACTS)):
+            for stepping, data in ((model, one), (other, two)):
+                data.ctrl[:] = action
+                mujoco.mj_step(stepping, data)
+                mujoco.mj_rnePostConstraint(stepping, data)
+            if _bits(one) != _bits(two):
                 return False
-            touched.update(map(tuple, one.contact.geom.tolist()))
-    if other.npair == model.npair:
-        return True
-    _, pairs = colliding_pairs(model)
-    return all((a, b) in touched or (b, a) in touched for a, b in pairs.tolist())
+            touched.update(map(tuple, np.sort(one.contact.geom).tolist()))
+    return touched >= set(map(tuple, np.sort(colliding_pairs(model)[1]).tolist()))
 
 
-def _same(one: Any, two: Any, names: tuple[str, ...]) -> bool:
-    """Return whether some fields of two objects have the same bytes."""
-    return all(
-        np.asarray(getattr(one, name)).tobytes() == np.asarray(getattr(two, name)).tobytes()
-        for name in names
-    )
-
-
-def _drawn(
-    model: mujoco.MjModel, rng: np.random.Generator, start: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a pose (nq,) and velocities (nv,) to start from."""
-    speed = _SPEED * rng.standard_normal(model.nv)
-    if start == 0:
-        return model.qpos0.copy(), np.zeros(model.nv)
-    pose = model.qpos0.copy()
-    for joint in range(model.njnt):
-        at = int(model.jnt_qposadr[joint])
-        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
-            if start % 2:  # Sunk: every geom level with the trunk touches.
-                pose[at + 2] = -_SUNK_M * start
-            else:
-                pose[at + 2] = 0.4
-                pose[at + 3 : at + 7] = rng.standard_normal(4)
-        elif model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_BALL:
-            low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-1.0, 1.0)
-            pose[at] += rng.uniform(-_POSE_NOISE, _POSE_NOISE) * (high - low)
-    mujoco.mj_normalizeQuat(model, pose)
-    return pose, speed
+def _bits(data: Any) -> list[bytes]:
+    parts = (data, _FIELDS), (data.contact, _OF_CONTACTS)
+    return [np.asarray(getattr(one, name)).tobytes() for one, names in parts for name in names]

@@ -35,6 +35,12 @@ Outcomes = tuple[NDArray[np.float64], NDArray[Any], NDArray[np.bool_], dict[str,
 
 # Arrays closer than this in memory, bytes, are compared together with the bytes between them.
 _APART: Final = 64
+# Numbers of the options that lie before their first array in memory. A test changes every number of
+# a model, so it finds one that is neither here nor between arrays.
+_outside: Final = attrgetter(
+    *("timestep", "impratio", "tolerance", "ls_tolerance", "noslip_tolerance", "ccd_tolerance"),
+    "sleep_tolerance",
+)
 
 
 @dataclass(eq=False)
@@ -42,8 +48,8 @@ class Shared:
     """Data that all watches of models with equal digests share.
 
     Attributes:
-        parts: The bytes of each watched region of memory. Because they are shared, they stay in
-            the caches of a core while many envs compare their models with them.
+        parts: The bytes of each watched region of memory: shared, they stay in the caches of a core
+            while many envs compare their models with them.
         steps: Steps that all envs with such a model have taken without a fast model.
         searched: Whether a fast model has been searched.
         fast: The fast model; None if no bit-equal model is known.
@@ -68,11 +74,8 @@ class ModelWatch:
     textures, which do not affect the physics. So no field can be forgotten, and restoring a field
     is detected too.
 
-    Args:
-        model: The model; the watch keeps it alive, because it reads the memory of its arrays.
-
     Attributes:
-        model: The watched model.
+        model: The watched model, kept alive because the memory of its arrays is read.
         digest: Hash of the model when the watch was created.
         shared: Data that equal models share.
         timestep: Timestep of the model when the watch was created, s.
@@ -80,14 +83,13 @@ class ModelWatch:
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.model = model
-        self.timestep = float(model.opt.timestep)
-        self._options, self._statistics = model.opt, model.stat
-        self._of_options, self._of_statistics = _readers()
+        self._options = model.opt
         # These come first, wherever they are in memory, so that equal models have equal digests.
         views = [*_views(sys.maxsize, model.opt, model.stat), *_views(_APART, model)]
         # A bytearray compares itself with any buffer by memcmp; bytes would not.
         parts = [bytearray(view) for view in views]
-        self._numbers = self._read_numbers()
+        self._numbers = _outside(self._options)
+        self.timestep = float(self._numbers[0])
         total = hashlib.blake2b(repr(self._numbers).encode(), digest_size=16)
         for part in parts:
             total.update(part)
@@ -98,25 +100,19 @@ class ModelWatch:
 
     def unedited(self) -> bool:
         """Return whether every number of the model is unchanged, to the last bit."""
-        if self._read_numbers() != self._numbers:
+        if _outside(self._options) != self._numbers:
             return False
         for before, now in self._parts:  # noqa: SIM110  # `all` takes twice as long.
             if before != now:
                 return False
         return True
 
-    def _read_numbers(self) -> tuple[Any, ...]:
-        return self._of_options(self._options), self._of_statistics(self._statistics)
-
 
 class Binding:
     """Views of one `MjData`, and the model that steps it.
 
-    Args:
-        watch: Watch of the public model.
-        env: The env.
-
     Attributes:
+        watch: Watch of the public model.
         model: The public model.
         stepping: The model that steps the data: the public model or its fast model.
         has_fast_model: Whether `stepping` is a fast model; None until the search for one.
@@ -139,11 +135,13 @@ class Binding:
         self.ctrl, self.qpos, self.qvel = data.ctrl, data.qpos, data.qvel
         self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[BAD_STATE]
         self.kind: str | None = None
+        if env.fast_model and watch.shared.fast is not None:
+            self.step_with(watch.shared.fast)
 
     def step_with(self, fast: mujoco.MjModel | None) -> None:
         """Step with a fast model from now on; with None, the public model keeps stepping."""
         self.has_fast_model = fast is not None
-        self.stepping = self.model if fast is None else fast
+        self.stepping = fast or self.model
 
     def move(self) -> None:
         """Step the physics."""
@@ -157,9 +155,6 @@ class TunedStep(Reshapable):
     Each step compares the public `model` with the compiled one. While it is edited, Gymnasium's own
     methods step it. They also step if a subclass overrides one of the methods in `replaced`, or if
     `model` has been replaced.
-
-    Subclasses implement `_advance`, list the methods that it replaces in `replaced`, and set
-    `tuned` and `binding`.
 
     To step many envs together, call `ready_together` of each, set their controls, call `move` of
     each binding, and then `conclude` once for all bindings of one `kind`. Whether a simulation has
@@ -306,10 +301,8 @@ class TunedStep(Reshapable):
         for name in self.replaced:
             if getattr(mine, name) is not getattr(self.tuned, name) or name in vars(self):
                 return None
-        bound = self._bound = self.binding(watch, self)
-        if self.fast_model and watch.shared.fast is not None:
-            bound.step_with(watch.shared.fast)
-        return bound
+        self._bound = self.binding(watch, self)
+        return self._bound
 
 
 def _views(apart: int, *owners: Any) -> list[Any]:
@@ -336,24 +329,3 @@ def _array_names(kind: type[Any]) -> list[str]:
     blank: Any = mujoco.MjSpec().compile() if kind is mujoco.MjModel else kind()
     names = (name for name in dir(kind) if type(getattr(blank, name)) is np.ndarray)
     return [name for name in names if name != "tex_data"]
-
-
-@cache
-def _readers() -> list[Any]:
-    """Return functions that read the options, and the statistics, outside of the watched memory.
-
-    Each number of a model is changed once, to see whether it lies within.
-    """
-    model = mujoco.MjSpec().compile()
-    (memory,) = _views(sys.maxsize, model.opt, model.stat)
-    readers: list[Any] = []
-    for part in (model.opt, model.stat):
-        outside: list[str] = []
-        for name in dir(part):
-            before, value = bytes(memory), getattr(part, name)
-            if isinstance(value, int | float):
-                setattr(part, name, value + 1)
-                if before == bytes(memory):
-                    outside.append(name)
-        readers.append(attrgetter("__class__", *outside))
-    return readers
