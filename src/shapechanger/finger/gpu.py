@@ -22,7 +22,7 @@ from torch import Tensor
 from typing_extensions import override
 
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
-from shapechanger.envs.warp.kernels import normals, uniforms
+from shapechanger.envs.warp.kernels import uniforms
 from shapechanger.envs.warp.reader import BodyReader, register_reader
 from shapechanger.envs.warp.tasks import DeviceTask, length
 from shapechanger.envs.warp.worlds import DeviceOutcome, Worlds
@@ -163,7 +163,7 @@ class DeviceFinger(DeviceTask):
         tensions = worlds.actuator_force.abs().to(self.precision)
         if any(self._noisy):
             constants, stream = worlds.constants, _SENSES + self._steps
-            noise = normals(self._seeds, self._episodes, stream, _J + _T)
+            noise = uniforms(self._seeds, self._episodes, stream, _J + _T, normal=True)
             angles = angles + constants["joint_noise"] * noise[:, :_J]
             tensions = (tensions + constants["tension_noise"] * noise[:, _J:]).clip(0.0)
         velocities = worlds.qvel[:, :_J].to(self.precision)

@@ -170,7 +170,7 @@ def pretended_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[PretendedDevic
     monkeypatch.setattr(worlds, "on", on)
     monkeypatch.setattr(kernels, "on", on)
     # There are no streams without a GPU.
-    monkeypatch.setattr(env, "Streams", lambda count, device: devices.Streams(count, "cpu"))
+    monkeypatch.setattr(env, "at_once", lambda calls, device: devices.at_once(calls, "cpu"))
     monkeypatch.setattr(worlds, "as_torch", lambda array: _mark(devices.as_torch(array)))
     monkeypatch.setattr(kernels, "as_warp", as_warp)
     monkeypatch.setattr(worlds.Worlds, "_run", run)

@@ -72,10 +72,7 @@ def test_a_body_with_other_arrays_is_refused(ants: WarpVectorEnv) -> None:
     """The sentence names the arrays and both bodies, and nothing has changed."""
     ants.reset(seed=0, options={"bodies": ["Ant", "BigAnt", "Ant"]})
     before = ants.bodies
-    sentence = (
-        r"body ExtendedAnt cannot join the batch of shapechanger/Ant-v1, body Ant, because nq, .* "
-        r"and \d+ more differ"
-    )
+    sentence = r"body ExtendedAnt cannot join the batch of .*, body Ant, because nq, .* differ"
     with pytest.raises(VectorEnvError, match=sentence):
         ants.reset(options={"bodies": ["AmputatedAnt", "Ant", "ExtendedAnt"]})
     assert ants.bodies == before

@@ -12,7 +12,7 @@ import torch
 
 import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
-from shapechanger.envs.warp.kernels import normals, uniforms
+from shapechanger.envs.warp.kernels import uniforms
 
 WORLDS = 3
 PUSH = torch.tensor([[3.0], [0.0], [0.0]])
@@ -118,7 +118,7 @@ def test_the_noise_is_uniform_and_normal() -> None:
     assert flat.max() < 1.0
     assert abs(float(flat.mean()) - 0.5) < 4e-3
     assert abs(float(flat.var()) - 1.0 / 12.0) < 2e-3
-    bell = normals(seeds, episodes, 1, 500)
+    bell = uniforms(seeds, episodes, 1, 500, normal=True)
     assert abs(float(bell.mean())) < 0.02
     assert abs(float(bell.var()) - 1.0) < 0.02
     rows = torch.cat([flat, uniforms(seeds, episodes + 1, 0, 500)])

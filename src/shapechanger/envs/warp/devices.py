@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, TypeVar, cast
 
 from shapechanger.errors import MissingExtra, UnknownName
@@ -67,22 +68,13 @@ def as_torch(array: Any) -> Tensor:
 
 
 def as_warp(tensor: Tensor, dtype: Any) -> Any:
-    """Return a Warp array that shares the memory of a tensor.
-
-    Args:
-        tensor: A contiguous tensor.
-        dtype: Warp's type of its numbers.
-    """
+    """Return a Warp array of numbers of a type that shares the memory of a contiguous tensor."""
     return wp.from_torch(tensor, dtype=dtype, requires_grad=False)
 
 
 @contextmanager
 def on(device: str) -> Generator[None]:
-    """Let Warp allocate and launch on a device; on a GPU in torch's current stream.
-
-    Args:
-        device: Its name.
-    """
+    """Let Warp allocate and launch on a device; on a GPU in torch's current stream."""
     with wp.ScopedDevice(device):
         if device == "cpu":
             yield
@@ -93,32 +85,22 @@ def on(device: str) -> Generator[None]:
                 yield
 
 
-class Streams:
-    """Streams of a GPU for independent calls, each of which would not occupy it alone.
+@cache
+def _streams(count: int, device: str) -> list[torch.cuda.Stream]:
+    return [torch.cuda.Stream(device) for _ in range(count)]
 
-    Args:
-        count: Number of calls.
-        device: Name of the device; calls on a CPU run one after another.
-    """
 
-    def __init__(self, count: int, device: str) -> None:
-        self._device = device
-        self._streams = (
-            [torch.cuda.Stream(device) for _ in range(count)]
-            if count > 1 and device != "cpu"
-            else []
-        )
-
-    def run(self, calls: Sequence[Callable[[], _Result]]) -> list[_Result]:
-        """Return the result of each call, for torch's current stream."""
-        if not self._streams:
-            return [call() for call in calls]
-        current = torch.cuda.current_stream(self._device)
-        results: list[_Result] = []
-        for stream, call in zip(self._streams, calls, strict=True):
-            stream.wait_stream(current)
-            with torch.cuda.stream(stream):
-                results.append(call())
-        for stream in self._streams:
-            current.wait_stream(stream)
-        return results
+def at_once(calls: Sequence[Callable[[], _Result]], device: str) -> list[_Result]:
+    """Return the result of each call, of which none occupies a GPU alone; on a CPU, one by one."""
+    if len(calls) == 1 or device == "cpu":
+        return [call() for call in calls]
+    current = torch.cuda.current_stream(device)
+    streams = _streams(len(calls), device)
+    results: list[_Result] = []
+    for stream, call in zip(streams, calls, strict=True):
+        stream.wait_stream(current)
+        with torch.cuda.stream(stream):
+            results.append(call())
+    for stream in streams:
+        current.wait_stream(stream)
+    return results

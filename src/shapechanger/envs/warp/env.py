@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, Final, cast
+from typing import Any, Final, TypeVar, cast
 
 import gymnasium as gym
 import numpy as np
@@ -15,16 +15,18 @@ from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
 from shapechanger.envs.checks import masked_options, one_seed_each
-from shapechanger.envs.warp.devices import Streams, without_gradients
+from shapechanger.envs.warp.devices import at_once, without_gradients
 from shapechanger.envs.warp.reader import BodyReader, grouped
 from shapechanger.envs.warp.worlds import Worlds
 from shapechanger.errors import BadAction, UnknownName, VectorEnvError
 from shapechanger.layout import Layout
 
 _OPTIONS: Final = ("bodies", "reset_mask")
+_NO_LIMIT: Final = 2**62  # Steps.
 # Steps between two checks whether the memory for contacts and constraints was too small.
 _LOOKS_EVERY: Final = 256
 
+_Result = TypeVar("_Result")
 Tensors = Tensor | tuple[Tensor, ...]
 """One tensor with a row per world, or one per batch where the spaces of the batches differ."""
 
@@ -99,7 +101,6 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             Worlds(*group, device, redraws=redraws, limits=limits or {})
             for group in grouped(reader, [reader.body(body) for body in bodies], num_envs)
         )
-        self._streams = Streams(len(self.batches), device)
         first = self.batches[0]
         self.observation_layout: Layout = first.observation_layout
         self.action_layout: Layout = first.action_layout
@@ -218,16 +219,15 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             present state.
         """
         every = mask, self._seeds, self._episodes
-        starts = self._streams.run(
-            [
-                partial(batch.start, *[self._rows(batch, each) for each in every])
-                for batch in self.batches
-            ]
-        )
+        starts = self._each(lambda batch: batch.start(*[self._rows(batch, one) for one in every]))
         self._episodes += mask
         self.episode_steps.masked_fill_(mask, 0)
         infos = self._gathered([info for _, info in starts]) if self._task_infos else {}
         return [seen for seen, _ in starts], infos
+
+    def _each(self, work: Callable[[Worlds], _Result]) -> list[_Result]:
+        """Return the result of `work` for each batch."""
+        return at_once([partial(work, batch) for batch in self.batches], self.device)
 
     @without_gradients()
     def step(self, actions: Any) -> tuple[Tensors, Tensor, Tensor, Tensor, dict[str, Any]]:
@@ -248,10 +248,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._require_open()
         if not self._begun:
             raise gym.error.ResetNeeded("No episode is under way: call `reset` first.")
-        each = self._checked(actions)
-        steps = self._streams.run(
-            [partial(batch.step, action) for batch, action in zip(self.batches, each, strict=True)]
-        )
+        each = dict(zip(self.batches, self._checked(actions), strict=True))
+        steps = self._each(lambda batch: batch.step(each[batch]))
         observations = [seen for seen, _, _ in steps]
         outcomes = [
             {"rewards": outcome.rewards, "terminated": outcome.terminated, "diverged": bad}
@@ -259,10 +257,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         ]
         rewards, terminated, diverged = self._gathered(outcomes).values()
         self.episode_steps += 1
-        if self.max_episode_steps is None:
-            truncated = torch.zeros_like(terminated)
-        else:
-            truncated = self.episode_steps >= self.max_episode_steps
+        limit = self.max_episode_steps
+        truncated = self.episode_steps >= (_NO_LIMIT if limit is None else limit)
         ended = terminated | truncated
         # Ended episodes are not checked, because reading the result would synchronise the GPU.
         starts, start_infos = self._start(ended)
@@ -310,16 +306,14 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
                 self._tensor(part, (batch.count, batch.action_layout.size), f" of batch {i}")
                 for i, (part, batch) in enumerate(zip(given, self.batches, strict=True))
             ]
-        bad = [~part.isfinite().all(dim=1) for part in each]
-        # The only synchronisation with the device in a step, before its physics.
-        found = _list(torch.stack([one.any() for one in bad]))
-        for batch, part, any_bad, one in zip(self.batches, each, found, bad, strict=True):
-            if any_bad:
-                place = int(one.nonzero()[0, 0])
-                raise BadAction(
-                    f"The action of world {int(batch.numbers[place])} has numbers that are not "
-                    f"finite: {_list(part[place])}."
-                )
+        finite = torch.cat([part.isfinite().all(dim=1) for part in each])
+        if not bool(finite.all()):  # The only synchronisation with the device before the physics.
+            place = int((~finite).nonzero()[0, 0])
+            world = int(torch.cat([batch.numbers for batch in self.batches])[place])
+            rows = [row for part in each for row in _list(part)]
+            raise BadAction(
+                f"The action of world {world} has numbers that are not finite: {rows[place]}."
+            )
         return each
 
     def _tensor(self, actions: Any, shape: tuple[int, int], which: str) -> Tensor:

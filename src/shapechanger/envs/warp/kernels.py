@@ -108,11 +108,6 @@ def uniforms(
     return numbers
 
 
-def normals(seeds: Tensor, episodes: Tensor, stream: int | Tensor, count: int) -> Tensor:
-    """Return normally distributed numbers, shape (n, count), float64; see `uniforms`."""
-    return uniforms(seeds, episodes, stream, count, normal=True)
-
-
 def follow_mujoco() -> None:
     """Let mujoco-warp's kernels, which are built later, use the functions of this module.
 

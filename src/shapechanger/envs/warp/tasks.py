@@ -30,7 +30,7 @@ from shapechanger.envs.pendulum import (
 )
 from shapechanger.envs.runners import HalfCheetahEnv, HopperEnv, SwimmerEnv, Walker2dEnv
 from shapechanger.envs.warp.bodies import geom_type
-from shapechanger.envs.warp.kernels import normals, uniforms
+from shapechanger.envs.warp.kernels import uniforms
 from shapechanger.envs.warp.worlds import DeviceOutcome, Worlds
 from shapechanger.errors import VectorEnvError
 from shapechanger.layout import Layout
@@ -113,24 +113,18 @@ class DeviceTask(ABC):
         }
 
     def start(self, worlds: Worlds, mask: Tensor, seeds: Tensor, episodes: Tensor) -> None:
-        """Put some worlds, whose state has been cleared, into start states.
+        """Put the worlds of a mask, whose state has been cleared, into start states.
 
         Joints are moved inside their limits, orientations normalised, and a trunk whose feet are in
-        the floor is lifted.
-
-        Args:
-            worlds: The worlds.
-            mask: Which worlds, shape (n,).
-            seeds: The seed of each world, shape (n,).
-            episodes: How many episodes each world has begun, shape (n,).
+        the floor is lifted. The arguments are those of `Worlds.start`.
         """
         constants, scale = worlds.constants, float(self._env._reset_noise_scale)
         qpos, qvel = constants["init_qpos"], constants["init_qvel"]
         moved = 2.0 * uniforms(seeds, episodes, _POSITIONS, qpos.shape[1]) - 1.0
-        if self.normal_velocities:
-            pushed = normals(seeds, episodes, _VELOCITIES, qvel.shape[1])
-        else:
-            pushed = 2.0 * uniforms(seeds, episodes, _VELOCITIES, qvel.shape[1]) - 1.0
+        drawn = seeds, episodes, _VELOCITIES, qvel.shape[1]
+        pushed = uniforms(*drawn, normal=self.normal_velocities)
+        if not self.normal_velocities:
+            pushed = 2.0 * pushed - 1.0
         qpos, qvel = qpos + (scale * moved).to(qpos.dtype), qvel + (scale * pushed).to(qvel.dtype)
         limits = constants["lowest"], constants["highest"]
         qpos[:, self._limited] = qpos[:, self._limited].clamp(*limits)
@@ -228,13 +222,9 @@ class DeviceAnt(DeviceTask):
     normal_velocities = True
     contact_forces = True
 
-    def __init__(self, env: Any, model: mujoco.MjModel, frame_skip: int) -> None:
-        super().__init__(env, model, frame_skip)
-        self._main = int(env.model.body(env.main_body).id)
-
     def place(self, worlds: Worlds) -> Tensor:
         """Return the place of the main body, m, shape (n, 2)."""
-        return worlds.xpos[:, self._main, :2]
+        return worlds.xpos[:, int(self.model.body(self._env.main_body).id), :2]
 
     def _forces(self, worlds: Worlds) -> Tensor:
         return worlds.cfrc_ext.clamp(*self._env._contact_force_range)
@@ -248,19 +238,17 @@ class DeviceAnt(DeviceTask):
 
     @override
     def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
-        env, qpos = self._env, worlds.qpos
-        velocity = (self.place(worlds) - before) / worlds.constants["dt"][:, None]
-        limits = worlds.constants["low"], worlds.constants["high"]
-        upright = is_upright(qpos[:, 2], qpos[:, 4], qpos[:, 5], *limits)
-        finite = qpos.isfinite().all(dim=1) & worlds.qvel.isfinite().all(dim=1)
-        healthy = upright & finite
-        rewards, infos = env._reward(
-            self.start_infos(worlds).values(),
-            velocity.T,
+        env, qpos, constants = self._env, worlds.qpos, worlds.constants
+        velocity = (self.place(worlds) - before) / constants["dt"][:, None]
+        limits = constants["low"], constants["high"]
+        healthy = is_upright(qpos[:, 2], qpos[:, 4], qpos[:, 5], *limits)
+        healthy &= qpos.isfinite().all(dim=1) & worlds.qvel.isfinite().all(dim=1)
+        costs = (
             _cost(env._ctrl_cost_weight, actions),
             _cost(env._contact_cost_weight, self._forces(worlds)),
-            healthy,
         )
+        place = self.start_infos(worlds).values()
+        rewards, infos = env._reward(place, velocity.T, *costs, healthy)
         return DeviceOutcome(rewards, ~healthy & bool(env._terminate_when_unhealthy), infos)
 
     @override
@@ -363,8 +351,7 @@ class DeviceRunner(DeviceTask):
             contact_cost=self._contact_cost(worlds),
         )
         rewards, terms = _base(env)._get_rew(there, velocity[:, 0], actions)
-        axes = "xy"[: self.place_size]
-        speeds = {f"{axis}_velocity": velocity[:, i] for i, axis in enumerate(axes)}
+        speeds = {f"{axis}_velocity": speed for axis, speed in zip("xy", velocity.T, strict=False)}
         ends = bool(getattr(env, "_terminate_when_unhealthy", False))
         infos = {**self.start_infos(worlds), **speeds, **terms}
         return DeviceOutcome(rewards, ~healthy & ends, infos)
@@ -428,11 +415,6 @@ class DeviceHumanoid(DeviceRunner):
     contact_forces = True
     start_forces = True
 
-    def __init__(self, env: Any, model: mujoco.MjModel, frame_skip: int) -> None:
-        super().__init__(env, model, frame_skip)
-        included = {name: getattr(env, f"_include_{name}_in_observation") for name in _BLOCKS}
-        self._blocks = [(name, first) for name, first in _BLOCKS.items() if included[name] is True]
-
     def place(self, worlds: Worlds) -> Tensor:
         """Return the place of the centre of mass, m, shape (n, 2)."""
         mass = worlds.row("body_mass")
@@ -440,7 +422,11 @@ class DeviceHumanoid(DeviceRunner):
 
     @override
     def observations(self, worlds: Worlds) -> Tensor:
-        blocks = [getattr(worlds, name)[:, first:].flatten(1) for name, first in self._blocks]
+        blocks = [
+            getattr(worlds, name)[:, first:].flatten(1)
+            for name, first in _BLOCKS.items()
+            if getattr(self._env, f"_include_{name}_in_observation") is True
+        ]
         return torch.cat([super().observations(worlds), *blocks], dim=1)
 
     def _contact_cost(self, worlds: Worlds) -> Tensor:
@@ -449,11 +435,8 @@ class DeviceHumanoid(DeviceRunner):
 
     @override
     def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
-        return {
-            **_place_infos(worlds),
-            "tendon_length": worlds.ten_length.clone(),
-            "tendon_velocity": worlds.ten_velocity.clone(),
-        }
+        tendons = worlds.ten_length.clone(), worlds.ten_velocity.clone()
+        return {**_place_infos(worlds), "tendon_length": tendons[0], "tendon_velocity": tendons[1]}
 
 
 TASKS: Final[dict[type[Any], type[DeviceTask]]] = {

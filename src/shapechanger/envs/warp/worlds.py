@@ -37,17 +37,8 @@ _ARRAYS: Final = (
 _CLEARED: Final = ("act", "qacc_warmstart", "ctrl", "qvel", "cfrc_ext", "time")
 # Overflows of the memory for contacts and constraints, by which results are wrong.
 _OVERFLOWS: Final = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
-# The most contacts that MuJoCo makes of two geoms; 8 for all other pairs.
-_CONTACTS: Final = {
-    frozenset(kinds.split()): count
-    for count, pairs in {
-        1: "PLANE SPHERE, PLANE ELLIPSOID, SPHERE, SPHERE CAPSULE, SPHERE CYLINDER, SPHERE BOX",
-        2: "PLANE CAPSULE, CAPSULE, CAPSULE BOX",
-        4: "PLANE CYLINDER, PLANE BOX",
-    }.items()
-    for kinds in pairs.split(", ")
-}
-_MOST_CONTACTS: Final = 8
+# The most contacts that MuJoCo makes of two geoms of which one has such a shape, and of others.
+_MOST_CONTACTS: Final = {"SPHERE": 1, "CAPSULE": 2, "": 8}
 # Most rows of one equality.
 _ROWS_PER_EQUALITY: Final = 6
 
@@ -137,10 +128,10 @@ class Worlds:
         self._overflow = as_torch(self._data.overflow)
         cleared = [getattr(self._data, name) for name in _CLEARED]
         self._cleared = [as_torch(array) for array in cleared if array.size]
-        # Fields of the model with a row per world.
+        # Fields of the model with a row per world, and the rows of each body for these, for the
+        # constants, and for the places of static geoms.
         self._rows: dict[str, Tensor] = {}
         self.constants: dict[str, Tensor] = {}
-        # The rows of each body for these, and for the places of static geoms.
         self._tables: dict[str, Tensor] = {}
         self._constant_tables: dict[str, Tensor] = {}
         self._static_tables: dict[str, Tensor] = {}
@@ -169,28 +160,21 @@ class Worlds:
         """Raise a VectorEnvError unless a body has the arrays of these worlds."""
         first = next(iter(self.bodies.values()))
         if arrays := differing_arrays(first, body):
-            more = f" and {len(arrays) - _MOST_LISTED} more" if len(arrays) > _MOST_LISTED else ""
             raise VectorEnvError(
                 f"{body.name} cannot join the batch of {first.name}, because "
-                f"{', '.join(arrays[:_MOST_LISTED])}{more} differ: worlds of one batch share these "
+                f"{', '.join(arrays[:_MOST_LISTED])} differ: worlds of one batch share these "
                 "arrays, so make the vector env with both bodies, which gives it a batch of each."
             )
 
     def change_bodies(self, bodies: Mapping[Any, DeviceBody], each: Sequence[Any]) -> None:
         """Replace the bodies that worlds can have; worlds with another one must start again.
 
+        The numbers of all bodies stay on the device, from which `_choose` gathers. A field of the
+        model gets a row per world as soon as two bodies differ in it.
+
         Args:
             bodies: The bodies, keyed by their edits.
             each: The edits of each world's body.
-        """
-        self._hold(bodies)
-        place = {body: i for i, body in enumerate(bodies)}
-        self._choose(torch.tensor([place[body] for body in each], device=self.device))
-
-    def _hold(self, bodies: Mapping[Any, DeviceBody]) -> None:
-        """Keep the numbers of bodies on the device, from which `_choose` gathers.
-
-        A field of the model gets a row per world as soon as two bodies differ in it.
         """
         self.bodies = bodies
         held = [*bodies.values()]
@@ -215,6 +199,8 @@ class Worlds:
             self._constant_tables[name] = table
             if name not in self.constants:
                 self.constants[name] = table.new_empty((self.count, *table.shape[1:]))
+        place = {body: i for i, body in enumerate(bodies)}
+        self._choose(torch.tensor([place[body] for body in each], device=self.device))
 
     def _choose(self, chosen: Tensor) -> None:
         """Give each world one of the stored bodies, without synchronisation with the device."""
@@ -366,8 +352,8 @@ def _room(model: mujoco.MjModel, pairs: NDArray[Any]) -> dict[str, int]:
     """Return the most contacts and rows of constraints where pairs, (k, 2), of geoms can touch."""
     contacts = rows = 0
     for pair in pairs.tolist():
-        kinds = frozenset(geom_type(model, geom) for geom in pair)
-        count = _CONTACTS.get(kinds, _MOST_CONTACTS)
+        kinds = {geom_type(model, geom) for geom in pair}
+        count = next(most for kind, most in _MOST_CONTACTS.items() if not kind or kind in kinds)
         condim = int(max([*model.geom_condim[pair], *model.pair_dim]))
         contacts += count
         rows += count * max(1, 2 * (condim - 1))
