@@ -146,7 +146,7 @@ def test_a_rig_on_a_robot_that_does_not_compile_is_refused(tmp_path: Path) -> No
     file = _written(tmp_path, "link.urdf", _LINK.format(mesh="wedge.obj", inertia="9"))
     # It compiles the robot to know its mass.
     family = own_family(file, (TotalMass(2.0),))
-    with pytest.raises(BrokenModel, match=r"MuJoCo does not compile link\.urdf: inertia must"):
+    with pytest.raises(BrokenModel, match=r"MuJoCo cannot compile link\.urdf: inertia must"):
         family.load(file)
     with pytest.raises(UnknownName, match="No joint matches 'knee'"):
         own_family(file, (AddMotor("knee"),)).load(file)

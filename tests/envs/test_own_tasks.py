@@ -159,12 +159,6 @@ def test_a_task_names_what_it_observes() -> None:
             observed(task)
 
 
-def test_a_robot_tells_its_numbers() -> None:
-    """Height, and the number of any name."""
-    assert robot().height == 0.5
-    assert robot()["knee/angle"] == 0.3
-
-
 def test_walking_pays_for_speed_and_health() -> None:
     """A fallen robot earns its speed alone, and ends the episode unless told otherwise."""
     walk = Walk(forward=2.0, alive=3.0, control=0.5, least_height=0.5, least_up=0.2)

@@ -107,17 +107,6 @@ def test_envs_render_in_turn(ant: Any) -> None:
     np.testing.assert_array_equal(ant.render(), frame)
 
 
-def test_an_unclosed_env_does_not_affect_others(ant: Any) -> None:
-    frame = ant.render()
-    dropped = gym.make("shapechanger/BigAnt-v1", render_mode="rgb_array", **_SIZE)
-    dropped.reset(seed=0)
-    dropped.render()
-    np.testing.assert_array_equal(ant.render(), frame)
-    del dropped
-    gc.collect()
-    np.testing.assert_array_equal(ant.render(), frame)
-
-
 def test_a_closed_env_can_render_again(ant: Any) -> None:
     """Closing is idempotent, and rendering afterwards works."""
     frame = ant.render()
@@ -202,26 +191,16 @@ def test_frames_follow_the_body(ant: Any) -> None:
 def test_the_camera_settings_are_kept() -> None:
     """Camera, size and options are kept when the body changes."""
     camera = {"distance": 9.0, "trackbodyid": 0, "elevation": -80.0}
-    arguments = {
-        "default_camera_config": camera,
-        "max_geom": 500,
-        "visual_options": {0: True},
-        "width": 80,
-        "height": 60,
-    }
-    with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **arguments) as env:
-        frames = []
+    arguments = {"default_camera_config": camera, "max_geom": 500, "visual_options": {0: True}}
+    with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **arguments, **_SIZE) as env:
         for body in ("BigAnt", "Ant"):
             env.reset(seed=0, options={"body": body})
-            frames.append(env.render())
+            env.render()
             renderer = env.unwrapped.mujoco_renderer
             assert renderer.default_cam_config == camera
             assert renderer.max_geom == 500
             assert renderer.viewer.cam.distance == 9.0
             assert renderer.viewer.vopt.flags[0] == 1
-    with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **arguments) as env:
-        env.reset(seed=0)
-        np.testing.assert_array_equal(env.render(), frames[1])
     with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **_SIZE, camera_id=0) as env:
         env.reset(seed=0, options={"body": "BigAnt"})
         assert env.unwrapped.mujoco_renderer.camera_id == 0
@@ -416,15 +395,9 @@ def test_only_textures_differ_without_rendering() -> None:
     """All other arrays equal an env's with rendering."""
     plain, drawn = _textured(), _textured(render_mode="rgb_array")
     assert plain.ntexdata < 0.3 * drawn.ntexdata
+    flat = plain.tex_type == mujoco.mjtTexture.mjTEXTURE_2D  # Floors are unchanged.
+    assert plain.tex_width[flat].tolist() == [100]
     for name in dir(drawn):
         value = getattr(drawn, name)
         if isinstance(value, np.ndarray) and name not in _PIXELS and name[0] != "_":
             np.testing.assert_array_equal(getattr(plain, name), value, err_msg=name)
-
-
-def test_floor_textures_keep_their_size() -> None:
-    """Floor textures keep their resolution; uniform ones shrink."""
-    model = _textured()
-    flat = model.tex_type == mujoco.mjtTexture.mjTEXTURE_2D
-    assert model.tex_width[flat].tolist() == [100]
-    assert model.tex_width[~flat].tolist() == [50, 63]

@@ -49,48 +49,19 @@ WAYPOINT_ENVS: Final = _variants("Waypoint", "camera and action the same for all
 """Vehicle and summary, keyed by id, for the same task with waypoints as actions."""
 
 
-class TaskEntry(msgspec.Struct, frozen=True):
-    """An env whose body does not belong to a family.
-
-    Attributes:
-        entry_point: Module and class.
-        summary: One-line description.
-        learner: Name of the learner settings tuned on it.
-        episode_steps: Steps after which an episode is truncated.
-        device: Module that registers its batched functions for a device; empty if it has none.
-    """
-
-    entry_point: str
-    summary: str
-    learner: str
-    episode_steps: int
-    device: str = ""
-
-
-def _finger(entry_point: str, task: str, steps: int) -> TaskEntry:
-    summary = f"finger of seven tendons: {task}"
-    place = f"shapechanger.finger.{entry_point}"
-    return TaskEntry(place, summary, "ppo-finger", steps, "shapechanger.finger.gpu")
-
-
-FINGER_ENVS: Final[Mapping[str, TaskEntry]] = {
-    "shapechanger/Finger-v1": _finger("reach:FingerReachEnv", "reach a point", 100),
-    "shapechanger/FingerTrack-v1": _finger("track:FingerTrackEnv", "follow a path", 250),
-}
-"""Envs of the finger, keyed by id."""
-
-
 class CatalogueEntry(msgspec.Struct, frozen=True):
-    """An env whose body belongs to a family.
+    """An env.
 
     Attributes:
         name: Its name; the id is `shapechanger/NAME-v1`.
-        family: Name of its body's family.
+        family: Name of its body's family; empty for an env whose body belongs to none.
         summary: One-line description.
         entry_point: Module and class.
-        learner: Name of the learner settings tuned on the family.
+        learner: Name of the learner settings tuned on the family or the env.
         body: Name of its body, passed to the class; empty for the default of the class.
         reward_threshold: Return that counts as solved.
+        episode_steps: Steps after which an episode is truncated.
+        device: Module that registers its batched functions for a device; empty if it has none.
     """
 
     name: str
@@ -100,12 +71,28 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
     learner: str
     body: str = ""
     reward_threshold: float | None = None
+    episode_steps: int = 1000
+    device: str = ""
 
     @property
     def id(self) -> str:
         """The registered id."""
         return f"{NAMESPACE}/{self.name}-v1"
 
+
+def _finger(name: str, entry_point: str, task: str, steps: int) -> CatalogueEntry:
+    return CatalogueEntry(
+        *(name, "", f"finger of seven tendons: {task}", f"shapechanger.finger.{entry_point}"),
+        learner="ppo-finger",
+        episode_steps=steps,
+        device="shapechanger.finger.gpu",
+    )
+
+
+_REACH: Final = _finger("Finger", "reach:FingerReachEnv", "reach a point", 100)
+_TRACK: Final = _finger("FingerTrack", "track:FingerTrackEnv", "follow a path", 250)
+FINGER_ENVS: Final = {entry.id: entry for entry in (_REACH, _TRACK)}
+"""Envs of the finger, keyed by id."""
 
 # For each family the module and class of its env, the learner settings tuned on it, and the reward
 # threshold of Gymnasium's v5 id.
@@ -147,16 +134,15 @@ def _entry(name: str, family: str, summary: str) -> CatalogueEntry:
     return CatalogueEntry(name, family, summary, place, learner, body, threshold)
 
 
-def _odrl_entry(name: str) -> CatalogueEntry:
-    """Return the entry of a body such as `odrl-ant-friction-0.1`."""
-    task = name.removeprefix("odrl-")
-    family = next(each for each in _FAMILIES if each.lower() == task.partition("-")[0])
-    return _entry(name, family, f"body of ODRL: {task}")
-
-
 CATALOGUE: Final = {entry.id: entry for entry in (_entry(*row) for row in _BODIES)}
 
-ODRL_ENVS: Final = {entry.id: entry for entry in map(_odrl_entry, odrl_bodies())}
+_ROBOTS: Final = {family.lower(): family for family in _FAMILIES}
+ODRL_ENVS: Final = {
+    entry.id: entry
+    for name in odrl_bodies()  # Such as `odrl-ant-friction-0.1`.
+    for task in [name.removeprefix("odrl-")]
+    for entry in [_entry(name, _ROBOTS[task.partition("-")[0]], f"body of ODRL: {task}")]
+}
 """Envs of ODRL, keyed by id: 4 sources and 80 targets; see `shapechanger.envs.odrl`."""
 
 # Envs whose bodies form no family, except the vehicle on the network.
@@ -164,7 +150,6 @@ _TASK_IDS: Final = (
     *(*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS),
     *(REMOTE_FINGER, REMOTE_FINGER_TRACK, OWN_ROBOT),
 )
-_EPISODE_STEPS: Final = 1000
 # Families with their own fast step, which Gymnasium's wrappers would slow down.
 _TUNED: Final = ("Ant", "InvertedPendulum")
 
@@ -185,7 +170,6 @@ def register_all() -> None:
         _register(
             entry.id,
             entry.entry_point,
-            _EPISODE_STEPS,
             reward_threshold=entry.reward_threshold,
             vector_entry_point=f"shapechanger.envs.make_vec:{entry.name}",
             # These envs check that `reset` was called, and the tests check the envs.
@@ -194,31 +178,30 @@ def register_all() -> None:
             kwargs={"body": entry.body} if entry.body else {},
         )
     vectors = {"vector_entry_point": "shapechanger.envs.make_vec:OwnRobot"}
-    _register(OWN_ROBOT, "shapechanger.envs.own:OwnRobotEnv", _EPISODE_STEPS, **vectors)
+    _register(OWN_ROBOT, "shapechanger.envs.own:OwnRobotEnv", **vectors)
     for envs, kind, steps in (
-        (VEHICLE_ENVS, "vehicle:VehicleEnv", _EPISODE_STEPS),
+        (VEHICLE_ENVS, "vehicle:VehicleEnv", 1000),
         (RANGES_ENVS, "ranges:RangesEnv", 400),  # Short, so that learners see more courses.
-        (WAYPOINT_ENVS, "vehicle:WaypointEnv", _EPISODE_STEPS),
+        (WAYPOINT_ENVS, "vehicle:WaypointEnv", 1000),
     ):
         for env_id, (vehicle, _) in envs.items():
             entry_point = f"shapechanger.vehicles.envs.{kind}"
             _register(env_id, entry_point, steps, kwargs={"vehicle": vehicle})
-    for env_id, task in FINGER_ENVS.items():
-        _register(env_id, task.entry_point, task.episode_steps)
-    reach, track = FINGER_ENVS.values()
+    for env_id, entry in FINGER_ENVS.items():
+        _register(env_id, entry.entry_point, entry.episode_steps)
     for env_id, entry_point, steps in (
-        (REMOTE_FINGER, "finger.remote:RemoteFingerEnv", reach.episode_steps),
-        (REMOTE_FINGER_TRACK, "finger.remote:RemoteFingerTrackEnv", track.episode_steps),
+        (REMOTE_FINGER, "finger.remote:RemoteFingerEnv", _REACH.episode_steps),
+        (REMOTE_FINGER_TRACK, "finger.remote:RemoteFingerTrackEnv", _TRACK.episode_steps),
         (REMOTE_VEHICLE, "robot.client.env:RemoteVehicleEnv", None),
         (REMOTE_WAYPOINT, "vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):
         _register(env_id, f"shapechanger.{entry_point}", steps, nondeterministic=True)  # A robot.
 
 
-def _register(env_id: str, entry_point: str, episode_steps: int | None, **more: Any) -> None:
+def _register(env_id: str, entry_point: str, steps: int | None = 1000, **more: Any) -> None:
     """Register an env unless it is registered already."""
     if env_id not in gym.registry:
-        gym.register(env_id, entry_point, max_episode_steps=episode_steps, **more)  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
+        gym.register(env_id, entry_point, max_episode_steps=steps, **more)  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
 
 
 def find(env_id: str) -> CatalogueEntry:

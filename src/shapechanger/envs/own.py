@@ -192,20 +192,18 @@ class OwnRobotEnv(Reshapable, EzPickle):
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
         features = position_features(model) + velocity_features(model) + contact_features(model)
-        names, moving = [feature.name for feature in features], model.nq + model.nv
-        places = sorted({*range(moving)} - _place_on_floor(model))
+        names = [feature.name for feature in features]
+        places = sorted({*range(model.nq + model.nv)} - _place_on_floor(model))
         if self._observed is not None:
-            seen: set[int] = set()
-            for pattern in self._observed:
-                of_pattern = {
-                    i for i, n in enumerate(names) if n == pattern or fnmatchcase(n, pattern)
-                }
-                if not of_pattern:
-                    raise UnknownName("observed number", pattern, names)
-                seen |= of_pattern
-            places = sorted(seen)
+            each = [
+                {i for i, name in enumerate(names) if name == one or fnmatchcase(name, one)}
+                for one in self._observed
+            ]
+            if not all(each):
+                missing = self._observed[each.index(set())]
+                raise UnknownName("observed number", missing, names)
+            places = sorted(set[int]().union(*each))
         self._places = np.array(places, np.intp)
-        self._contacts_observed = any(place >= moving for place in places)
         self._place_of = {name: place for place, name in enumerate(names)}
         return [features[place] for place in places]
 
@@ -219,13 +217,11 @@ class OwnRobotEnv(Reshapable, EzPickle):
         # A diverged state is not the task's fault, so the task is not called.
         terms = {} if diverged else reward_terms(self.task, self.task_name, robot)
         terminated = diverged or has_ended(self.task, self.task_name, robot)
-        (x, y, _), (x_velocity, y_velocity, _) = robot.place.tolist(), robot.velocity.tolist()
-        info = {
-            **{"x_position": x, "y_position": y},
-            **{"x_velocity": x_velocity, "y_velocity": y_velocity},
-            **{f"reward_{name}": value for name, value in terms.items()},
-            **({"diverged": True} if diverged else {}),
-        }
+        info = self._get_reset_info()
+        info["x_velocity"], info["y_velocity"] = robot.velocity[:2].tolist()
+        info |= {f"reward_{name}": value for name, value in terms.items()}
+        if diverged:
+            info["diverged"] = True
         if self.render_mode == "human":
             self.render()
         return self._get_obs(), sum(terms.values(), 0.0), terminated, False, info
@@ -241,23 +237,22 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return self._get_obs()
 
     def _get_obs(self) -> _Floats:
-        return self._all_numbers(self._contacts_observed)[self._places]
+        return self._all_numbers()[self._places]
 
     def _get_reset_info(self) -> dict[str, Any]:
         x, y, _ = self.trunk_place().tolist()
         return {"x_position": x, "y_position": y}
 
-    def _all_numbers(self, contacts: bool) -> _Floats:
+    def _all_numbers(self) -> _Floats:
         """Return all numbers that can be observed, in the order of the names."""
         data = self.data
-        blocks = [data.qpos, data.qvel, *([data.cfrc_ext[1:].ravel()] if contacts else [])]
-        return np.concatenate(blocks)
+        return np.concatenate([data.qpos, data.qvel, data.cfrc_ext[1:].ravel()])
 
     def _number(self, name: str) -> float:
         """Return the observable number with a name."""
         if name not in self._place_of:
             raise UnknownName(f"number of {self.family.name}", name, self._place_of)
-        return float(self._all_numbers(contacts=True)[self._place_of[name]])
+        return float(self._all_numbers()[self._place_of[name]])
 
     def trunk_place(self) -> _Floats:
         """Return the place of the trunk in the world, shape (3,), m, as of the last step."""
@@ -319,18 +314,17 @@ def from_mjcf(
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
             `go2_mj_description`, which downloads it.
-        task: `walk`, or your own task: `module:Name`, a class, a function or an object; see
-            `shapechanger.envs.own_tasks`. Worker processes need one that they can import.
-        body: Edits of `shapechanger.morphology`, or their JSON.
-        rig: Edits that are applied before those of any body, such as `AddMotor("*")`.
+        task: As in `OwnRobotEnv`. Worker processes need one that they can import.
+        body: As in `OwnRobotEnv`.
+        rig: As in `OwnRobotEnv`.
         task_options: Arguments of the task's class.
         max_episode_steps: Steps after which an episode is truncated.
         **arguments: More arguments of `OwnRobotEnv`, such as `frame_skip` or `render_mode`.
 
     Raises:
         UnknownName: If there is no such file, task, edit or argument.
-        BrokenModel: If MuJoCo cannot read or compile the file.
-        MorphologyError: If the model is not a robot that can be controlled.
+        MorphologyError: If the file cannot be read or compiled, or is not a robot that can be
+            controlled.
         TaskError: If the task cannot be made or does not fit the robot.
     """
     file = Path(path).expanduser()

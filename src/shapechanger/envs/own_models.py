@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import mujoco
+import numpy as np
 
 from shapechanger.envs.catalogue import MODEL_FILES
 from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
@@ -26,15 +27,14 @@ _IN_PACKAGE: Final = re.compile(r"(package|model)://+(?P<name>[^/]+)/(?P<rest>.+
 
 
 @contextmanager
-def compiling(path: Path) -> Generator[None]:
+def compiling(path: Path, verb: str = "compile") -> Generator[None]:
     """Report errors of MuJoCo as a `BrokenModel` with the name of a file."""
     try:
         yield
+    except ShapechangerError:
+        raise
     except (ValueError, mujoco.FatalError) as error:
-        if isinstance(error, ShapechangerError):
-            raise
-        reason = reason_of(error)
-        raise BrokenModel(f"MuJoCo does not compile {path.name}: {reason}.") from error
+        raise BrokenModel(f"MuJoCo cannot {verb} {path.name}: {reason_of(error)}.") from error
 
 
 @dataclass(frozen=True)
@@ -58,17 +58,12 @@ class OwnFamily(Family):
         A file that a URDF names as `package://NAME/REST` is searched in each folder NAME that
         contains the URDF, or lies next to such a folder.
 
-        Args:
-            path: The file.
-
         Raises:
             BrokenModel: If MuJoCo cannot read or compile it, or no folder has a file of a package.
             MorphologyError: If the rig does not fit it.
         """
-        try:
+        with compiling(Path(path), "read"):
             spec = mujoco.MjSpec.from_file(str(path))
-        except (ValueError, mujoco.FatalError) as error:
-            raise BrokenModel(f"MuJoCo cannot read {path}: {reason_of(error)}.") from error
         _find_packages(spec, Path(path))
         # By default, MuJoCo would merge the base of a URDF into the world, and lose its names.
         spec.compiler.fusestatic = False
@@ -146,11 +141,7 @@ def _described(name: str) -> Path:
 
 
 def require_robot(model: mujoco.MjModel, path: Path) -> None:
-    """Require a compiled model with joints and actuators.
-
-    Raises:
-        MorphologyError: If it has no joints, no actuators, or an actuator without a range.
-    """
+    """Raise a MorphologyError unless a model has joints, and actuators with ranges."""
     if not model.njnt:
         raise MorphologyError(f"{path.name} has no joints, so it cannot move.")
     if not model.nu:
@@ -158,9 +149,8 @@ def require_robot(model: mujoco.MjModel, path: Path) -> None:
         raise MorphologyError(
             f"{path.name} has no actuators: add them to the file, or motors with {motors}."
         )
-    limited = model.actuator_ctrllimited
-    if unlimited := [model.actuator(i).name for i in range(model.nu) if not limited[i]]:
+    if unlimited := np.flatnonzero(model.actuator_ctrllimited == 0).tolist():
         raise MorphologyError(
             f"These actuators of {path.name} have no ctrlrange, so their range is unknown: "
-            f"{', '.join(unlimited)}."
+            f"{', '.join(model.actuator(i).name for i in unlimited)}."
         )

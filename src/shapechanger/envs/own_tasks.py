@@ -234,18 +234,13 @@ def reward_terms(task: OwnTask, name: str, robot: RobotState) -> dict[str, float
 
 
 def has_ended(task: OwnTask, name: str, robot: RobotState) -> bool:
-    """Return whether a task, with its name, ends the episode of a robot.
-
-    Raises:
-        TaskError: If its answer is neither true nor false.
-    """
-    terminated: Any = getattr(task, "terminated", None)
-    answer: Any = terminated is not None and terminated(robot)
+    """Return whether a task ends the episode; raise a TaskError unless it says true or false."""
+    answer: Any = getattr(task, "terminated", lambda _: False)(robot)
     if not isinstance(answer, bool | np.bool_):
         raise TaskError(
             f"`terminated` of the task {name!r} returns {answer!r}: it must be True or False."
         )
-    return bool(cast("Any", answer))
+    return bool(answer)
 
 
 def observed(task: OwnTask) -> Sequence[str] | None:
@@ -255,9 +250,7 @@ def observed(task: OwnTask) -> Sequence[str] | None:
         TaskError: If they are not a sequence of names.
     """
     given: Any = getattr(task, "observe", None)
-    if given is None:
-        return None
-    names: list[Any] = [] if isinstance(given, str) else list(given)
-    if not names or not all(isinstance(each, str) for each in names):
+    names: list[Any] = [] if given is None or isinstance(given, str) else list(given)
+    if given is not None and not (names and all(isinstance(each, str) for each in names)):
         raise TaskError(f"`observe` is a list of names or globs of numbers, got {given!r}.")
-    return names
+    return names or None

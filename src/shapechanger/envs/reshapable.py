@@ -336,20 +336,17 @@ class Reshapable(MujocoEnv):
             ("observation", self.observation_layout, observation),
             ("action", self.action_layout, action),
         ):
-            lost = [name for name in old.names if name not in new]
-            gained = [name for name in new.names if name not in old]
-            moves = (("it loses", lost), ("it gains", gained))
-            changes = [f"{verb} {', '.join(names[:3])}" for verb, names in moves if names]
-            if not changes and old.names != new.names:
-                changes = ["its order changes"]
-            bounds = [(one.low.tolist(), one.high.tolist()) for one in (old, new)]
-            if not changes and space == "action" and bounds[0] != bounds[1]:
-                changes = ["its bounds move"]
-            if changes:
+            changed = sorted(set(old.names) ^ set(new.names)) or [
+                one.name
+                for one, other in zip(old, new, strict=True)
+                if one.name != other.name
+                or (space == "action" and (one.low, one.high) != (other.low, other.high))
+            ]
+            if changed:
                 raise SpaceMismatch(
                     f"This body would change the {space} space from {old.size} to {new.size} "
-                    f"numbers ({'; '.join(changes)}): a reset cannot change a space, so "
-                    "make another env with this body and transfer with a body map."
+                    f"numbers, such as {', '.join(changed[:3])}: a reset cannot change a space, "
+                    "so make another env with this body and transfer with a body map."
                 )
 
     # Interface of transfer studies; see `shapechanger.contract.env_ref`.

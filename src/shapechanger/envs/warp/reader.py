@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import gymnasium as gym
 
-from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS, NAMESPACE
+from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS
 from shapechanger.envs.checks import describe_body
 from shapechanger.envs.warp.bodies import DeviceBody, device_body, differing_arrays
 from shapechanger.envs.warp.tasks import TASKS, DeviceTask
@@ -106,11 +106,10 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
     if reader is not None:
         return reader(first, make, arguments)
     classes = {kind.__name__ for kind in TASKS}
-    known = [e.name for e in CATALOGUE.values() if e.entry_point.rpartition(":")[2] in classes]
-    known += [
-        name.removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
-        for name, task in FINGER_ENVS.items()
-        if task.device
+    known = [
+        entry.name
+        for entry in (*CATALOGUE.values(), *FINGER_ENVS.values())
+        if entry.device or entry.entry_point.rpartition(":")[2] in classes
     ]
     raise VectorEnvError(
         f"{env_id} has no batched functions, which backend='warp' needs: those exist for "
