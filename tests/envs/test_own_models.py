@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.envs.own_models import own_family, require_robot
+from shapechanger.envs.own import own_family, require_robot
 from shapechanger.errors import BrokenModel, MorphologyError, UnknownName
 from shapechanger.morphology import (
     AddFloor,

@@ -119,7 +119,7 @@ def make_vec(
             raise VectorEnvError("Give either `bodies`, one per world, or a `pool` of some bodies.")
         from shapechanger.envs.warp import WarpVectorEnv, find_device, make_reader  # Warp.
 
-        limits = {name: recorded[name] for name in ("nconmax", "njmax") if name in recorded}
+        limits = {"nconmax": nconmax, "njmax": njmax}
         place = find_device(device)
         envs = WarpVectorEnv(
             make_reader(made_from, partial(_make, made_from), arguments),
@@ -127,7 +127,7 @@ def make_vec(
             count,
             device=place,
             redraws=pool is not None,
-            limits={name: _at_least_one(name, number) for name, number in limits.items()},
+            limits={k: _at_least_one(k, most) for k, most in limits.items() if most is not None},
             task_infos=task_infos,
         )
         spec = copying.deepcopy(envs.made_from)
@@ -190,13 +190,12 @@ def _at_least_one(what: str, number: int) -> int:
 
 
 def _mode(mode: AutoresetMode | str | None, backend: str) -> AutoresetMode:
-    if mode is None:
-        return AutoresetMode.SAME_STEP if backend == "warp" else AutoresetMode.NEXT_STEP
-    known = {known.value: known for known in AutoresetMode}
-    wanted = known.get(mode.value if isinstance(mode, AutoresetMode) else mode)
+    usual = AutoresetMode.SAME_STEP if backend == "warp" else AutoresetMode.NEXT_STEP
+    known = {one.value: one for one in AutoresetMode}
+    wanted = usual if mode is None else known.get(getattr(mode, "value", mode))
     if wanted is None:
         raise UnknownName("autoreset mode", str(mode), known)
-    if backend == "warp" and wanted is not AutoresetMode.SAME_STEP:
+    if backend == "warp" and wanted is not usual:
         raise VectorEnvError(
             f"backend='warp' has no autoreset mode {wanted.value}: its worlds start again in the "
             "step in which their episode ends, autoreset_mode='SameStep'."

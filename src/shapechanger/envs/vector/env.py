@@ -150,12 +150,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         options: Sequence[dict[str, Any] | None],
         chosen: Iterable[int] | None = None,
     ) -> tuple[NDArray[Any], list[dict[str, Any]]]:
-        """Start an episode in each env as `reset` does, but return one info per env.
-
-        Args:
-            seeds: The seed of each env.
-            options: The options of each env.
-            chosen: Numbers of the envs to reset; None for all.
+        """Start an episode in each env, or in those of some numbers, as `reset` does.
 
         Returns:
             The observations of all envs, and the info of each, empty if it was not reset.
@@ -192,14 +187,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return observations, results.rewards, *ends, results.batched(self)
 
     def step_each(self, actions: Any) -> tuple[NDArray[Any], StepResults]:
-        """Take one step in each env as `step` does, but return results that hold one info per env.
-
-        Args:
-            actions: One action per env; their precision is kept.
-
-        Returns:
-            The observations of all envs, and all other results.
-        """
+        """Take one step as `step` does; return observations, and results with an info per env."""
         self._require_open()
         waits = self._mode is AutoresetMode.NEXT_STEP
         waiting = self._ended if waits else np.zeros(self.num_envs, np.bool_)
@@ -239,24 +227,18 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             bound.ctrl[:] = actions[i]
             bound.move()
 
-        # Threads rarely take equally long, so each takes its own envs from the front and then
-        # those of other threads from the back. A deque hands out each env once. Envs that may draw
-        # must stay in their thread.
-        queues = [
-            deque(i for i in part if self._subs[i].tuned is not None)
-            for part in self._threads.parts
-        ]
+        # Threads rarely take equally long, so they take envs from the two ends of a deque, which
+        # hands out each once. Envs that may draw must stay in their thread.
+        queue = deque(i for i in range(self.num_envs) if self._subs[i].tuned is not None)
 
         def work(thread: int, failures: Failures) -> None:
             for i in self._threads.parts[thread]:
                 if self._subs[i].tuned is None:
                     attempt(advance, i, failures)
-            own = queues[thread]
-            for queue in (own, *queues):
-                take = queue.popleft if queue is own else queue.pop
-                with suppress(IndexError):  # All envs have been taken.
-                    while True:
-                        attempt(advance, take(), failures)
+            take = queue.pop if thread % 2 else queue.popleft
+            with suppress(IndexError):  # All envs have been taken.
+                while True:
+                    attempt(advance, take(), failures)
 
         self._threads.share([partial(work, thread) for thread in range(self.threads)])
         kinds: dict[str, list[int]] = {}

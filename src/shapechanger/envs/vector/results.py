@@ -22,15 +22,12 @@ Step = tuple[Any, Any, Any, dict[str, Any]]
 
 
 class InfoColumns(NamedTuple):
-    """Infos of envs that have the same keys, and no infos within.
-
-    Attributes:
-        numbers: The numbers of the envs, ascending.
-        values: One value per env for each key.
-    """
+    """Infos of envs that have the same keys, and no infos within."""
 
     numbers: Sequence[int]
+    """The numbers of the envs, ascending."""
     values: Mapping[str, Sequence[Any] | NDArray[Any]]
+    """One value per env for each key."""
 
 
 def in_columns(infos: Mapping[int, Mapping[str, Any]]) -> list[InfoColumns]:
@@ -75,9 +72,6 @@ class StepResults:
     """Results of one step of all envs; threads may fill in different envs at the same time.
 
     Infos that arrive in columns stay columns until they are needed env by env.
-
-    Args:
-        num_envs: How many envs there are.
 
     Attributes:
         rewards: Shape (n,).
@@ -135,10 +129,6 @@ class SubEnv:
     acceleration that is huge or not finite, or when an observation is not finite. MuJoCo then
     restarts from the model's own pose, which the action did not cause: the env is terminated, the
     reward is 0, and the info has `diverged`. Observations that are not finite read 0.
-
-    Args:
-        env: The env, from `gym.make`.
-        row: Array to write its observations into.
 
     Attributes:
         tuned: The env without its time limit if its physics can be stepped separately, else None.

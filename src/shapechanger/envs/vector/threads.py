@@ -67,7 +67,7 @@ class EnvThreads:
     def do(
         self, work: Callable[[int], object], numbers: Iterable[int], *, alone: bool = False
     ) -> None:
-        """Do `work` for some envs, each in its own thread; return when all of it is done.
+        """Do `work` for the envs of some numbers, each in its own thread; return at its end.
 
         Args:
             work: Takes the number of an env.
