@@ -177,8 +177,8 @@ def register_all() -> None:
             disable_env_checker=entry.family in _TUNED,
             kwargs={"body": entry.body} if entry.body else {},
         )
-    vectors = {"vector_entry_point": "shapechanger.envs.make_vec:OwnRobot"}
-    _register(OWN_ROBOT, "shapechanger.envs.own:OwnRobotEnv", **vectors)
+    vectors = "shapechanger.envs.make_vec:OwnRobot"
+    _register(OWN_ROBOT, "shapechanger.envs.own:OwnRobotEnv", vector_entry_point=vectors)
     for envs, kind, steps in (
         (VEHICLE_ENVS, "vehicle:VehicleEnv", 1000),
         (RANGES_ENVS, "ranges:RangesEnv", 400),  # Short, so that learners see more courses.

@@ -192,7 +192,7 @@ def _at_least_one(what: str, number: int) -> int:
 def _mode(mode: AutoresetMode | str | None, backend: str) -> AutoresetMode:
     usual = AutoresetMode.SAME_STEP if backend == "warp" else AutoresetMode.NEXT_STEP
     known = {one.value: one for one in AutoresetMode}
-    wanted = usual if mode is None else known.get(getattr(mode, "value", mode))
+    wanted = usual if mode is None else known.get(str(getattr(mode, "value", mode)))
     if wanted is None:
         raise UnknownName("autoreset mode", str(mode), known)
     if backend == "warp" and wanted is not usual:

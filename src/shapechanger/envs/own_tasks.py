@@ -235,12 +235,13 @@ def reward_terms(task: OwnTask, name: str, robot: RobotState) -> dict[str, float
 
 def has_ended(task: OwnTask, name: str, robot: RobotState) -> bool:
     """Return whether a task ends the episode; raise a TaskError unless it says true or false."""
-    answer: Any = getattr(task, "terminated", lambda _: False)(robot)
+    terminated: Any = getattr(task, "terminated", None)
+    answer: Any = terminated is not None and terminated(robot)
     if not isinstance(answer, bool | np.bool_):
         raise TaskError(
             f"`terminated` of the task {name!r} returns {answer!r}: it must be True or False."
         )
-    return bool(answer)
+    return bool(cast("Any", answer))
 
 
 def observed(task: OwnTask) -> Sequence[str] | None:

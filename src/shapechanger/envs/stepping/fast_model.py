@@ -150,7 +150,7 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
     rng = np.random.default_rng(_SEED)
     one, two = mujoco.MjData(model), mujoco.MjData(model)
     touched: set[tuple[int, ...]] = set()
-    axes = np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE))
+    axes = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)  # Slides and hinges.
     for start in range(_STARTS):
         pose, speed = model.qpos0.copy(), np.zeros(model.nv)
         if start:
@@ -175,10 +175,15 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
                 mujoco.mj_rnePostConstraint(stepping, data)
             if _bits(one) != _bits(two):
                 return False
-            touched.update(map(tuple, np.sort(one.contact.geom).tolist()))
-    return touched >= set(map(tuple, np.sort(colliding_pairs(model)[1]).tolist()))
+            touched |= _sorted(one.contact.geom)
+    return touched >= _sorted(colliding_pairs(model)[1])
 
 
 def _bits(data: Any) -> list[bytes]:
     parts = (data, _FIELDS), (data.contact, _OF_CONTACTS)
     return [np.asarray(getattr(one, name)).tobytes() for one, names in parts for name in names]
+
+
+def _sorted(pairs: Any) -> set[tuple[int, ...]]:
+    """Return pairs of geoms, (n, 2), each in ascending order."""
+    return {tuple(pair) for pair in cast("list[list[int]]", np.sort(pairs).tolist())}
