@@ -116,7 +116,7 @@ class DeviceTask(ABC):
         """Put the worlds of a mask, whose state has been cleared, into start states.
 
         Joints are moved inside their limits, orientations normalised, and a trunk whose feet are in
-        the floor is lifted. The arguments are those of `Worlds.start`.
+        the floor is lifted. For the arguments see `Worlds.start`.
         """
         constants, scale = worlds.constants, float(self._env._reset_noise_scale)
         qpos, qvel = constants["init_qpos"], constants["init_qvel"]
