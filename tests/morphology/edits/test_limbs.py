@@ -67,6 +67,15 @@ def test_a_cut_leaves_something() -> None:
         built(spec, Cut("lower", 0.5))
 
 
+def test_a_partial_cut_shrinks_what_goes() -> None:
+    """Geoms beyond it become small, and points at the end are pulled in by a part of the way."""
+    spec = arm(lower='<geom name="far" size=".01" pos=".35 0 0"/><site name="end" pos=".4 0 0"/>')
+    half = built(spec, Cut("lower", 0.5).partly(0.5))
+    assert half.geom("far").size[0] == pytest.approx(0.005)
+    np.testing.assert_allclose(half.geom("far").pos, [0.35, 0.0, 0.0])
+    np.testing.assert_allclose(half.site("end").pos, [0.3, 0.0, 0.0])
+
+
 # --- Remove ------------------------------------------------------------------------------------
 
 

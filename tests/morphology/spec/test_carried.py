@@ -106,3 +106,11 @@ def test_a_trunk_on_a_slide_starts_at_the_height() -> None:
     mujoco.mj_kinematics(model, data)
     assert data.body("trunk").xpos[2] == pytest.approx(0.8)
     np.testing.assert_allclose(model.key_qpos[0], [0.2, 0.1, 0.2, 0.3])
+
+
+def test_a_keyframe_keeps_its_mocap_bodies() -> None:
+    """Their pose there, not the model's."""
+    spec = arm('<keyframe><key mpos="1 2 3"/></keyframe>')
+    spec.worldbody.add_body(name="hand", mocap=True, pos=[0.0, 0.0, 2.0])
+    model = built(spec, Mass("lower", scale=2.0))
+    np.testing.assert_array_equal(model.key_mpos[0], [1.0, 2.0, 3.0])
