@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, cast
 
 import msgspec
 import numpy as np
@@ -225,7 +225,8 @@ def own_episodes(
             header = EpisodeHeader.from_json(fields)
         runs: _Runs = converted(fields.get("drivers", []), _Runs, where)
         drivers = chain.from_iterable(repeat(driver, count) for driver, count in runs)
-        episodes.append((header, str(fields.get("outcome", "")), drivers))
+        outcome = str(fields.get("outcome", ""))
+        episodes.append((header, outcome, cast("Iterator[Driver]", drivers)))
     kinds = {(h.actions.size, h.states.size, h.image_size) for h, *_ in episodes}
     if found is not None:
         kinds.add((found.actions.size, found.states.size, found.image_size))

@@ -317,7 +317,7 @@ class _Dataset:
             images = batch.column(self._stored)[here] if stored else None
             for row in range(rows):
                 frame, image = next(steps)
-                driver: Driver = next(drivers, "person")
+                driver = cast("Driver", next(drivers, "person"))
                 single = {key: float(columns[key][row, 0]) for key in self._columns}
                 reward, is_done = single.get(_REWARD, math.nan), bool(single.get(DONE, False))
                 ended = bool(single.get(_TERMINATED, is_done))
