@@ -298,8 +298,7 @@ def test_a_partial_import_has_an_exit_code_of_its_own(
         (tub / f"images/{n}_cam_image_array_.jpg").write_bytes(b"")
     command = ["demos", "import", str(tub), "--out", str(tmp_path / "data")]
     sentence = demos.refused(*command[1:], "--strict")
-    left_out = "left out: 4 records with an empty image: 3, 5, 8, and 1 more"
-    assert f"is incomplete ({left_out})" in sentence
+    assert "is incomplete (record 3: an empty image)" in sentence
     assert not (tmp_path / "data").exists()
     with pytest.raises(SystemExit) as ended:
         main(command)
@@ -307,12 +306,12 @@ def test_a_partial_import_has_an_exit_code_of_its_own(
     output = capsys.readouterr()
     assert "1 episode, 26 steps, 26 images" in output.out
     assert "note: Columns that are not imported: lap.\n" in output.out
-    assert "which is taken to be 20 Hz; --hz states another rate.\n" in output.out
-    assert output.err == "left out 4 records with an empty image: 3, 5, 8, and 1 more\n"
+    assert "which is taken to be 20 Hz; --hz states it.\n" in output.out
+    assert output.err == "left out: record 3, record 5, record 8, and 1 more: an empty image\n"
     with pytest.raises(SystemExit) as ended:
         main(["demos", "import", str(tub), "--out", str(tmp_path / "b"), "--hz", "10"])
     assert ended.value.code == 3
-    assert "these times are left out" in capsys.readouterr().out
+    assert "their times are left out" in capsys.readouterr().out
 
 
 def test_export_prints_a_summary_and_how_to_load(
@@ -324,8 +323,8 @@ def test_export_prints_a_summary_and_how_to_load(
     DemosExport(tmp_path / "data", tmp_path / "sets/drive-v0", "minari").run()
     output = capsys.readouterr().out
     assert "3 steps of 2 episodes\n" in output
-    assert "so episodes are split at 1 gap of excluded or missing steps" in output
-    assert "left out 2 dropped steps; --dropped includes them" in output
+    assert "so episodes are split at pauses and where steps are excluded" in output
+    assert "note: Dropped steps are left out (2); --dropped includes them." in output
     assert f"MINARI_DATASETS_PATH={tmp_path / 'sets'}" in output
     assert "minari.load_dataset('drive-v0')" in output
     DemosExport(tmp_path / "data", tmp_path / "csv", "csv", dropped=True).run()
@@ -337,12 +336,12 @@ def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     edit(drive(tmp_path / "data"), Drop(0, 0, "bad"))
     DemosExport(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
     output = capsys.readouterr().out
-    assert "4 steps of 1 episode\nleft out 1 dropped step\n" in output
+    assert "4 steps of 1 episode\nnote: Dropped steps are left out (1).\n" in output
     assert f"LeRobotDataset('set', root='{tmp_path / 'set'}')" in output
     DemosImport(tmp_path / "set", tmp_path / "back", camera="camera").run()
     assert "(lerobot): 1 episode, 4 steps, 4 images" in capsys.readouterr().out
     DemosExport(tmp_path / "data", tmp_path / "logs", "mcap").run()
-    assert "left out 1 dropped step; --dropped includes them" in capsys.readouterr().out
+    assert "left out (1); --dropped includes them" in capsys.readouterr().out
 
 
 @pytest.fixture(autouse=True)
