@@ -8,8 +8,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from shapechanger.robot.client.operator import Takeover
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import run_robot
+from tests.robot.client.robot import observation
 
 pytestmark = pytest.mark.realtime
 
@@ -60,3 +62,10 @@ def test_a_person_takes_over_and_gives_back(tmp_path: Path) -> None:
         person.arm()
         info = step_until(lambda info: info["action_applied"][1] > 0.0)
         assert "intervene_action" not in info
+
+
+def test_an_emergency_stop_ends_a_lent_episode() -> None:
+    takeover = Takeover(allowed=True)
+    assert takeover.goes_on(observation(holder="Ada", holder_role="person"))
+    stopped = observation(holder="Ada", holder_role="person", emergency=True)
+    assert not takeover.goes_on(stopped)

@@ -162,6 +162,7 @@ def test_outputs_stay_off_while_a_channel_is_in_doubt() -> None:
     hardware.fault.arm(4, takes_effect=True)
     with pytest.raises(RobotError, match="timed out"):
         esc.write(1.0, 1)
+    assert hardware.factory.pin(26).state == 1.0
     servo.write(0.5, 2)
     assert hardware.factory.pin(26).state == 1.0
     esc.write(0.0, 3)

@@ -9,7 +9,7 @@ import msgspec.msgpack
 import pytest
 
 from tests.robot.client.attacks.scene import FULL, Scene, settle
-from tests.robot.client.attacks.stranger import BINARY, TEXT, Stranger, frame, proof
+from tests.robot.client.attacks.stranger import BINARY, TEXT, Stranger, frame, header, proof
 
 pytestmark = [pytest.mark.system, pytest.mark.realtime]
 
