@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import builtins
 import pickle
-import re
 from pathlib import Path
 
 import numpy as np
@@ -28,33 +26,6 @@ _CLASSES = [
     for name, value in vars(errors).items()
     if isinstance(value, type) and value.__module__ == errors.__name__
 ]
-
-
-def _printed_tree() -> dict[str, tuple[str, str | None]]:
-    """Return parent and builtin base of each class in the module's docstring."""
-    lines = re.findall(
-        r"^((?:[│ ]   |[├└]── )*)(\w+)(?: \((\w+)\))?(?:  .*)?$", errors.__doc__ or "", re.M
-    )
-    tree: dict[str, tuple[str, str | None]] = {}
-    above: list[str] = []
-    for indent, name, builtin in lines:
-        if not name.endswith(("Error", *_CLASSES)):
-            continue
-        depth = len(indent) // 4
-        above = [*above[:depth], name]
-        tree[name] = (above[depth - 1] if depth else "Exception", builtin or None)
-    return tree
-
-
-def test_the_docstring_shows_the_hierarchy() -> None:
-    """Each class has the bases that the module's docstring shows."""
-    tree = _printed_tree()
-    assert sorted(tree) == sorted(_CLASSES)
-    for name, (parent, builtin) in tree.items():
-        bases = [base.__name__ for base in getattr(errors, name).__bases__]
-        assert bases == [parent, *([builtin] if builtin else [])]
-        assert issubclass(getattr(errors, name), ShapechangerError)
-        assert builtin is None or hasattr(builtins, builtin)
 
 
 def test_unknown_names_suggest_the_nearest() -> None:

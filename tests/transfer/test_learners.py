@@ -135,19 +135,19 @@ def test_a_file_alone_calls_no_function(tmp_path: Path) -> None:
 
 def test_a_file_alone_imports_no_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file may not name a module that is not imported yet, unless the caller names it too."""
-    (tmp_path / "own_a2c.py").write_text(
+    (tmp_path / "own_class.py").write_text(
         "from stable_baselines3 import A2C\nclass Own(A2C): pass\n"
     )
     monkeypatch.syspath_prepend(str(tmp_path))
     policy, _, settings = trained("stable_baselines3:A2C")
-    own = msgspec.structs.replace(settings, algorithm="own_a2c:Own")
+    own = msgspec.structs.replace(settings, algorithm="own_class:Own")
     path = tmp_path / "policy.safetensors"
     save_policy(policy.carded(settings=own), path)
-    with pytest.raises(PolicyError, match=r"^A policy of own_a2c:Own needs the module own_a2c"):
+    with pytest.raises(PolicyError, match=r"^A policy of own_class:Own needs the module own_class"):
         load_policy(path)
-    assert "own_a2c" not in sys.modules
-    assert type(load_policy(path, "own_a2c:Own").model).__name__ == "Own"
-    monkeypatch.delitem(sys.modules, "own_a2c")
+    assert "own_class" not in sys.modules
+    assert type(load_policy(path, "own_class:Own").model).__name__ == "Own"
+    monkeypatch.delitem(sys.modules, "own_class")
 
 
 @pytest.mark.parametrize("learner", EACH[:3])

@@ -20,7 +20,7 @@ from shapechanger.demos.episodes import (
     episodes_of,
     read_episode,
 )
-from shapechanger.demos.exchange import Converted, Format, ImportContext, Record
+from shapechanger.demos.exchange import Converted, ExchangeRecord, Format, ImportContext
 from shapechanger.demos.exchange.base import whole_records
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
@@ -136,10 +136,10 @@ def tub_folder(
 
 def read_whole(
     folder: Path, form: Format, camera: str = ""
-) -> tuple[list[list[Record]], ImportContext]:
+) -> tuple[list[list[ExchangeRecord]], ImportContext]:
     """Read a folder as an import does: the whole records of each episode, and the findings."""
     context = ImportContext(camera=camera)
-    found: list[list[Record]] = []
+    found: list[list[ExchangeRecord]] = []
     assert form.read is not None
     for episode in form.read(folder, context):
         try:

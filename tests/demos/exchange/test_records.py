@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Step
-from shapechanger.demos.exchange import ExchangeEpisode, ImportContext, Record
+from shapechanger.demos.exchange import ExchangeEpisode, ExchangeRecord, ImportContext
 from shapechanger.demos.exchange.base import drives, whole_records
 from shapechanger.demos.exchange.files import load_jpeg
 from shapechanger.demos.jpeg import decode_picture
@@ -63,7 +63,7 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
 ) -> None:
     context = ImportContext()
     records = [
-        Record(
+        ExchangeRecord(
             name=f"record {n}",
             step=Step(action=(0.0 if finite else math.nan, n), driver="person"),
             image=data,
@@ -94,7 +94,7 @@ def test_drives_are_whole_records_in_order_of_one_size_and_without_jumps(
 ) -> None:
     """So that rates and jumps see the others as missing."""
     records = [
-        Record(
+        ExchangeRecord(
             name=f"record {n}",
             number=n,
             image=image,

@@ -18,7 +18,7 @@ DOCS = Path(__file__).parents[3] / "docs/exchange.md"
 
 FORMAT = """
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import ExchangeEpisode, Format, Record
+from shapechanger.demos.exchange import ExchangeEpisode, Format, ExchangeRecord
 from shapechanger.layout import Feature, Layout
 
 LAYOUT = Layout((Feature("speed", "m/s"),))
@@ -33,7 +33,7 @@ def read(folder, context):
         except ValueError:
             context.report("left out", "not a number", line)
             continue
-        records.append(Record(step=step))
+        records.append(ExchangeRecord(step=step))
     yield ExchangeEpisode(header=header, records=records, name=str(folder))
 
 

@@ -1,5 +1,7 @@
 """The client against a fake robot on a real socket."""
 
+from __future__ import annotations
+
 import multiprocessing
 import traceback
 from collections.abc import Callable

@@ -36,11 +36,11 @@ from shapechanger.demos.episodes.records import is_episode, longest_period_s
 from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
 from shapechanger.demos.exchange.base import (
     ExchangeEpisode,
+    ExchangeRecord,
     ExportContext,
-    Finding,
     Format,
     ImportContext,
-    Record,
+    ImportFinding,
     whole_records,
 )
 from shapechanger.demos.exchange.files import new_folder
@@ -50,11 +50,11 @@ from shapechanger.files import writing
 __all__ = [
     "Converted",
     "ExchangeEpisode",
+    "ExchangeRecord",
     "ExportContext",
-    "Finding",
     "Format",
     "ImportContext",
-    "Record",
+    "ImportFinding",
     "export_recording",
     "find_format",
     "formats",
@@ -99,7 +99,7 @@ class Converted:
     episodes: int
     steps: int
     pictures: int = 0
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[ImportFinding, ...] = ()
 
 
 def export_recording(
@@ -156,7 +156,7 @@ def export_recording(
     if left := sum(len(episode.steps) for episode in read) - steps:
         hint = "; --dropped includes them" if "dropped" in form.options else ""
         notes.append(f"Dropped steps are left out ({left}){hint}.")
-    findings = tuple(Finding("note", note) for note in notes)
+    findings = tuple(ImportFinding("note", note) for note in notes)
     return Converted(format, len(episodes), steps, findings=findings)
 
 
@@ -178,7 +178,7 @@ def _exchanged(
             began = datetime.fromisoformat(header.created) + timedelta(seconds=since_s)
             header = replace(header, created=began.isoformat(timespec="milliseconds"))
 
-    def records() -> Iterator[Record]:
+    def records() -> Iterator[ExchangeRecord]:
         marks, frame, jpeg = defaultdict[int, list[str]](list), "", None
         for mark in episode.marks:
             marks[mark.step].append(mark.text)
@@ -186,7 +186,7 @@ def _exchanged(
             if step.frame != frame:
                 frame, jpeg = step.frame, episode.jpeg(step)
             why = episode.excluded.get(step.index)
-            yield Record(step=step, jpeg=jpeg, marks=tuple(marks[step.index]), dropped=why)
+            yield ExchangeRecord(step=step, jpeg=jpeg, marks=tuple(marks[step.index]), dropped=why)
 
     name = episode.path.name
     return ExchangeEpisode(header=header, records=records(), name=name, outcome=outcome)

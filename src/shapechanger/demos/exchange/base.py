@@ -1,6 +1,6 @@
 """Formats of datasets: their declaration, the names of their columns, and records on their way.
 
-A reader yields `ExchangeEpisode`s of `Record`s; `whole_records` leaves out what is not whole. If
+A reader yields `ExchangeEpisode`s of `ExchangeRecord`s; `whole_records` leaves out those that are damaged. If
 the rate is not stated, `drives` measures it: the mean over the periods near the median, because a
 median of times in whole milliseconds is off by up to 2 % at 20 Hz.
 """
@@ -78,7 +78,7 @@ UNKNOWN_RATE: Final = f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; -
 
 
 @dataclass(slots=True, kw_only=True)
-class Record:
+class ExchangeRecord:
     """A step between two formats.
 
     Attributes:
@@ -119,7 +119,7 @@ class ExchangeEpisode:
     """
 
     header: EpisodeHeader
-    records: Iterable[Record]
+    records: Iterable[ExchangeRecord]
     name: str
     outcome: str = ""
 
@@ -128,7 +128,7 @@ Kind = Literal["note", "warning", "left out"]
 """Kinds of findings: something harmless, a contradiction in the source, and a part left out."""
 
 
-class Finding(NamedTuple):
+class ImportFinding(NamedTuple):
     """A finding of an import or an export, as a sentence or as names and a reason."""
 
     kind: Kind
@@ -173,10 +173,10 @@ class ImportContext:
             )
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[ImportFinding, ...]:
         """All findings, such as "record 12, record 15, and 2 more: an empty image"."""
         found = self._found.items()
-        return tuple(Finding(k, f"{few(n)}: {text}" if n else text) for (k, text), n in found)
+        return tuple(ImportFinding(k, f"{few(n)}: {text}" if n else text) for (k, text), n in found)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -234,7 +234,7 @@ def few(names: Sequence[object]) -> str:
     return f"{shown}, and {len(names) - 3} more" if len(names) > 3 else shown
 
 
-def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[Record]:
+def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[ExchangeRecord]:
     """Yield the records of an episode that are whole, with images as JPEG; report the others."""
     size = episode.header.image_size
     shown, jpeg = None, None
@@ -266,7 +266,7 @@ def _size_fault(found: tuple[int, int], size: tuple[int, int]) -> str:
 
 def decoded_images(
     episode: ExchangeEpisode, title: str
-) -> Iterator[tuple[Record, NDArray[np.uint8] | None]]:
+) -> Iterator[tuple[ExchangeRecord, NDArray[np.uint8] | None]]:
     """Yield the records of an episode with images of one size at all steps or none.
 
     Each comes with the pixels of its image if it is new, shape (height, width, 3).
@@ -294,11 +294,11 @@ def value_names(layout: Iterable[Feature]) -> list[str]:
 
 
 def drives(
-    sessions: Sequence[list[Record]],
+    sessions: Sequence[list[ExchangeRecord]],
     header: EpisodeHeader,
     context: ImportContext,
     stated_hz: float | None = None,
-) -> Iterator[tuple[list[Record], EpisodeHeader]]:
+) -> Iterator[tuple[list[ExchangeRecord], EpisodeHeader]]:
     """Yield the drives of a source that does not state its rate or the size of its images.
 
     Records without a whole image of the most frequent size are left out, so that rates and pauses
@@ -318,7 +318,7 @@ def drives(
                 record.fault = str(error)
     sizes = Counter(record.size for record in chain(*sessions) if record.size)
     ((common, _),) = sizes.most_common(1) or [(None, 0)]
-    parts: list[list[Record]] = []
+    parts: list[list[ExchangeRecord]] = []
     for session in sessions:
         for record in session:
             if record.size and common and not record.fault:
@@ -348,17 +348,17 @@ def drives(
             yield part[one:two], head
 
 
-def _passed_ns(one: Record, two: Record) -> int:
+def _passed_ns(one: ExchangeRecord, two: ExchangeRecord) -> int:
     return (two.step.captured_ns or 0) - (one.step.captured_ns or 0)
 
 
-def _leave_out_times(part: Iterable[Record]) -> None:
+def _leave_out_times(part: Iterable[ExchangeRecord]) -> None:
     for record in part:
         record.step = structs.replace(record.step, captured_ns=None)
 
 
 def _rates(
-    parts: Sequence[list[Record]], context: ImportContext, stated_hz: float | None
+    parts: Sequence[list[ExchangeRecord]], context: ImportContext, stated_hz: float | None
 ) -> list[float]:
     """Return the rate of each session; times that contradict the stated one are left out."""
     timed = [part if part[0].step.captured_ns is not None else [] for part in parts]

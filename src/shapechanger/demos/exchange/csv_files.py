@@ -82,7 +82,7 @@ def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.Expor
     return steps
 
 
-def _cells(record: base.Record, columns: _Columns) -> Iterator[str]:
+def _cells(record: base.ExchangeRecord, columns: _Columns) -> Iterator[str]:
     """Yield the cells of a step after those of its index, image and driver."""
     for field, names in list(columns.items())[3:]:
         value: Any = getattr(record if field in {"marks", "dropped"} else record.step, field)
@@ -165,15 +165,15 @@ def _records(
     lines: _Table,
     columns: _Columns,
     factors: Mapping[str, int] | None,
-) -> list[base.Record]:
+) -> list[base.ExchangeRecord]:
     """Return the lines of a table with their images.
 
     An own table has no `factors` of columns, and the tables of others may lack columns.
     """
-    records: list[base.Record] = []
+    records: list[base.ExchangeRecord] = []
     shown, known, last = "", set[str](), -1
     for position, (line, cells) in enumerate(lines):
-        record = base.Record(step=Step(action=(), driver="person"), number=position)
+        record = base.ExchangeRecord(step=Step(action=(), driver="person"), number=position)
         record.name = f"line {line} of {folder.parent.name if factors is None else folder.name}"
         records.append(record)
         try:
@@ -198,7 +198,7 @@ def _records(
 
 
 def _fill(
-    record: base.Record,
+    record: base.ExchangeRecord,
     cells: Mapping[str, str],
     columns: _Columns,
     factors: Mapping[str, int] | None,

@@ -288,7 +288,7 @@ class _Dataset:
             raise DemosError(f"{name} lacks an image at the time of a step.")
         return read_pictures(self._folder / name, times, times.ticks[nearest])
 
-    def _records(self, entry: _Entry, drivers: Iterator[Driver]) -> Iterator[base.Record]:
+    def _records(self, entry: _Entry, drivers: Iterator[Driver]) -> Iterator[base.ExchangeRecord]:
         """Yield the records of an episode; refuse rows with other keys than expected."""
         number, rate_hz = entry.episode_index, self._info.fps
         sizes = {f.key: f.size for f in (self._action, *self._states)}
@@ -327,7 +327,7 @@ class _Dataset:
                     read = image
                     if self._most_bytes < 0:
                         raise DemosError(f"{path} has images of far more bytes than its files.")
-                yield base.Record(
+                yield base.ExchangeRecord(
                     name=f"step {frame} of episode {number}",
                     step=Step(
                         action=tuple(columns[_ACTION][row].tolist()),

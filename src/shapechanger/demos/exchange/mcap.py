@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from shapechanger.demos.exchange.base import ExchangeEpisode, ExportContext, Format, Record
+from shapechanger.demos.exchange.base import ExchangeEpisode, ExchangeRecord, ExportContext, Format
 from shapechanger.demos.exchange.files import library
 from shapechanger.layout import Layout
 
@@ -94,7 +94,7 @@ def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
 
 
 def _messages(
-    record: Record, is_new: bool, seen_ns: int, layouts: Mapping[str, Layout]
+    record: ExchangeRecord, is_new: bool, seen_ns: int, layouts: Mapping[str, Layout]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the topics and the messages of a step."""
     step = record.step

@@ -291,7 +291,7 @@ class _Dataset:
             raise DemosError(f"{_MAIN} claims at least {self._claimed} values, but is smaller.")
         return columns
 
-    def _records(self, number: int) -> Iterator[base.Record]:
+    def _records(self, number: int) -> Iterator[base.ExchangeRecord]:
         with _opened(self._main) as file:
             columns = self._columns(file, number)
             steps, size = len(columns[_TERMINATED]), sum(one.nbytes for one in columns.values())
@@ -308,7 +308,7 @@ class _Dataset:
                     record.name = name
                     yield record
 
-    def _record(self, row: Mapping[str, Any], number: int) -> base.Record:
+    def _record(self, row: Mapping[str, Any], number: int) -> base.ExchangeRecord:
         (reward,) = _numbers(row, [_REWARD])
         fields: dict[str, Any] = {"driver": "expert", "truncated": bool(row[_TRUNCATED])}
         rest = _Rest(step=fields, marks=(), dropped=None)
@@ -318,7 +318,7 @@ class _Dataset:
             rest.step["reward"] = reward
         action, state = (_numbers(row, names) for names in (self._action, self._state))
         known = {"action": action, "state": state, "terminated": bool(row[_TERMINATED])}
-        record = base.Record(step=Step.from_json(rest.step | known))
+        record = base.ExchangeRecord(step=Step.from_json(rest.step | known))
         record.marks, record.dropped = rest.marks, rest.dropped
         if self._image:
             record.frame, stored = int(row.get(_FRAME, number)), row[self._image]

@@ -179,7 +179,7 @@ def _float(value: Any) -> float:
     return math.nan
 
 
-def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.Record:
+def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.ExchangeRecord:
     """Return a record; it has a fault if it has no valid action."""
     known, fault = _Record(), ""
     try:
@@ -201,11 +201,11 @@ def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.Record:
         state=tuple(_float(fields.get(name)) for name in sensed),
         captured_ns=None if known.time_ms is None else round(known.time_ms * _NS_PER_MS),
     )
-    return base.Record(name=f"record {number}", number=number, step=step, fault=fault)
+    return base.ExchangeRecord(name=f"record {number}", number=number, step=step, fault=fault)
 
 
 def _find_images(
-    records: list[base.Record], names: list[Any], folder: Path, context: base.ImportContext
+    records: list[base.ExchangeRecord], names: list[Any], folder: Path, context: base.ImportContext
 ) -> None:
     """Find the image of each record by its name; the others get a fault."""
     images = folder / _IMAGES
