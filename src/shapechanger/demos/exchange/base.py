@@ -1,8 +1,8 @@
 """Formats of datasets: their declaration, the names of their columns, and records on their way.
 
-A reader yields `ExchangeEpisode`s of `ExchangeRecord`s; `whole_records` leaves out those that are damaged. If
-the rate is not stated, `drives` measures it: the mean over the periods near the median, because a
-median of times in whole milliseconds is off by up to 2 % at 20 Hz.
+A reader yields `ExchangeEpisode`s of `ExchangeRecord`s; `whole_records` leaves out the damaged
+ones. If the rate is not stated, `drives` measures it: the mean over the periods near the median,
+because a median of times in whole milliseconds is off by up to 2 % at 20 Hz.
 """
 
 from __future__ import annotations
