@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import math
+import tomllib
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+import msgspec
 import mujoco
 
 from shapechanger.errors import ProfileError, UnknownName
-from shapechanger.vehicles.bodies.boat import BOAT
-from shapechanger.vehicles.bodies.land import CAR, TANK, TRUCK
-from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs, VehicleModel
-from shapechanger.vehicles.bodies.parts import HOBBY_SERVO, aim_camera
+from shapechanger.vehicles.bodies.boat import Floating
+from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs, Rolling
+from shapechanger.vehicles.bodies.parts import (
+    HOBBY_MOTOR,
+    CameraMount,
+    DcMotor,
+    add_servo,
+    aim_camera,
+)
 from shapechanger.vehicles.bodies.visuals import dress
 
 __all__ = [
@@ -31,10 +40,60 @@ __all__ = [
 SIM_DT: Final = 0.005
 """Simulation step, s, at which all vehicles are stable."""
 
-_MODELS: Final = Path(__file__).parent / "models"
+_FOLDER: Final = Path(__file__).parent
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleModel:
+    """A kind of vehicle.
+
+    Attributes:
+        name: Name, such as "car".
+        drives: Alternative sets of parts that drive and steer it; a robot has exactly one set.
+        optional_parts: Further parts that a robot may have; they have no effect in simulation.
+        length_m: Length from bumper to bumper, trailer included.
+        width_m: Largest width.
+        nose_m: Distance from the origin to the front bumper.
+        floats: Whether it moves on water.
+        camera: Mount of its camera.
+        top_speed_mps: Speed at full throttle and `BATTERY_V`, on level ground or in still water.
+        turning_radius_m: Radius of the origin's path at full lock; 0 if it turns on the spot.
+        gear: Turns of `HOBBY_MOTOR` for each turn of the shaft that it drives.
+        efficiency: Share of the torque that the gear passes on.
+        lock_deg: Angle at full steering, of a rudder, or of a wheel in the middle of the front
+            axle; 0 for a vehicle without steering.
+    """
+
+    name: str
+    drives: tuple[frozenset[str], ...]
+    optional_parts: frozenset[str] = frozenset()
+    length_m: float
+    width_m: float
+    nose_m: float
+    floats: bool = False
+    camera: CameraMount
+    top_speed_mps: float
+    turning_radius_m: float
+    gear: float
+    efficiency: float = 1.0
+    lock_deg: float = 0.0
+
+    @property
+    def motor(self) -> DcMotor:
+        """Motor of each of its driving parts, with its gear."""
+        return HOBBY_MOTOR.geared(self.gear, self.efficiency)
+
+    def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> BoundVehicle:
+        """Find its joints and motors in a compiled model."""
+        kind = Floating if self.floats else Rolling
+        return kind(model, data, self.motor, math.radians(self.lock_deg))
+
 
 VEHICLES: Final[Mapping[str, VehicleModel]] = MappingProxyType(
-    {model.name: model for model in (CAR, TANK, TRUCK, BOAT)}
+    {
+        name: msgspec.convert({"name": name, **numbers}, VehicleModel)
+        for name, numbers in tomllib.loads((_FOLDER / "vehicles.toml").read_text("utf-8")).items()
+    }
 )
 """Vehicle models, keyed by name."""
 
@@ -55,9 +114,9 @@ def add_vehicle(
     it, each 0 to 1, for views from outside.
     """
     model = vehicle_model(name)
-    vehicle = mujoco.MjSpec.from_file(str(_MODELS / f"{name}.xml"))
+    vehicle = mujoco.MjSpec.from_file(str(_FOLDER / "models" / f"{name}.xml"))
     model.motor.add(vehicle)
-    HOBBY_SERVO.add(vehicle)
+    add_servo(vehicle)
     dress(vehicle, name, light)
     aim_camera(vehicle.body("chassis").add_camera(name="camera"), model.camera)
     spec.attach(vehicle, prefix="vehicle/", frame=spec.worldbody.add_frame())

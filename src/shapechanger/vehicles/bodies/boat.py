@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Final
 
 import mujoco
 
-from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs, VehicleModel
-from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR, CameraMount, DcMotor
+from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs
+from shapechanger.vehicles.bodies.parts import DcMotor
 
 _WATER_DENSITY: Final = 1000.0  # kg/m3, fresh
 # Share of its full speed that the wash has reached at the rudder: 0.6 for hulls in H. Yasukawa and
@@ -152,12 +151,8 @@ _PROPELLER: Final = Propeller(
 _TWIN: Final = replace(_PROPELLER, diameter=0.028, wake=0.9)
 _PROPELLERS: Final = {"propeller": _PROPELLER, "left propeller": _TWIN, "right propeller": _TWIN}
 
-# The motor with a gear of 2.5:1, as sold for model boats, instead of 4.4:1.
-_MOTOR: Final = HOBBY_MOTOR.geared(2.5 / 4.4)
-
 _RUDDER: Final = Fin(x=-0.27, height=0.045, chord=0.035)
 _SKEG: Final = Fin(x=-0.20, height=0.035, chord=0.10)
-_FULL_RUDDER: Final = math.radians(35.0)  # The usual limit of ships.
 
 
 class Floating(BoundVehicle):
@@ -167,16 +162,20 @@ class Floating(BoundVehicle):
     the manoeuvring equations.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, motor: DcMotor) -> None:
-        super().__init__(model, data, motor)
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, motor: DcMotor, full_lock: float
+    ) -> None:
+        super().__init__(model, data, motor, full_lock)
         self._dt = float(model.opt.timestep)
         chassis = model.body("vehicle/chassis")
         self._mass, self._inertia = float(chassis.mass[0]), float(chassis.inertia[2])
         # Address in qvel of the shaft of each propeller, and its position to the left, m.
-        joints = {part: model.joint(f"vehicle/{part}") for part in _PROPELLERS}
-        self._shafts = {
-            part: (int(joint.dofadr[0]), float(model.body(f"vehicle/{part}").pos[1]))
-            for part, joint in joints.items()
+        self._propellers = {
+            part: (
+                int(model.joint(f"vehicle/{part}").dofadr[0]),
+                float(model.body(f"vehicle/{part}").pos[1]),
+            )
+            for part in _PROPELLERS
         }
         # Three joints in a row: x, y and yaw.
         self._qpos0 = int(model.joint("vehicle/chassis x").qposadr[0])
@@ -198,7 +197,7 @@ class Floating(BoundVehicle):
         """Apply outputs and the forces of the water."""
         rudder = outputs.get("rudder", 0.0)
         if rudder is not None:
-            self._ctrl[self._servo] = min(1.0, max(-1.0, rudder)) * _FULL_RUDDER
+            self._ctrl[self._servo] = min(1.0, max(-1.0, rudder)) * self._full_lock
         super().drive(outputs, battery_v)
         # Twin propellers steer without a rudder.
         self._apply_water("rudder" in outputs or "propeller" in outputs)
@@ -233,7 +232,7 @@ class Floating(BoundVehicle):
         x, y, n = _SKEG.force(u, v, r, 0.0)
         flow = u
         for part, propeller in _PROPELLERS.items():
-            rate, (dof, aside) = self._drives[part].rate(), self._shafts[part]
+            rate, (dof, aside) = float(self._rates[self._shafts[part][1]]), self._propellers[part]
             if abs(rate) < 1e-3:  # Stopped: neither thrust nor torque.
                 self._push[dof] = 0.0
                 continue
@@ -265,18 +264,3 @@ class Floating(BoundVehicle):
         self._push[i] = along * cosine - across * sine
         self._push[i + 1] = along * sine + across * cosine
         self._push[i + 2] = self._inertia * dr
-
-
-BOAT: Final = VehicleModel(
-    name="boat",
-    drives=(frozenset({"propeller", "rudder"}), frozenset({"left propeller", "right propeller"})),
-    length_m=_LENGTH,
-    width_m=_WIDTH,
-    nose_m=_LENGTH / 2,
-    floats=True,
-    camera=CameraMount(x=0.16, y=0.0, z=0.14, pitch_rad=math.radians(3.0)),
-    top_speed_mps=1.2,
-    turning_radius_m=0.7,  # At full throttle; measured in a test.
-    motor=_MOTOR,
-    bind=partial(Floating, motor=_MOTOR),
-)

@@ -1,17 +1,16 @@
-"""Interfaces of a vehicle: its model, the vehicle in a running simulation, and its contacts."""
+"""Vehicles in a running simulation: what all have, those on land, and their contacts."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
 
-from shapechanger.vehicles.bodies.parts import CameraMount, DcMotor
+from shapechanger.vehicles.bodies.parts import DcMotor
 
 Outputs = Mapping[str, float | None]
 """Output of each part, from -1 to 1; None for a motor that is disconnected.
@@ -41,38 +40,6 @@ class Motion(NamedTuple):
     yaw_rate: float
 
 
-class MotorDrive:
-    """A motor in a running simulation, which turns the joints of a tendon."""
-
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, name: str, motor: DcMotor
-    ) -> None:
-        self._motor, self._ctrl = motor, data.ctrl
-        self._velocity = data.ten_velocity
-        self._actuator, self._tendon = int(model.actuator(name).id), int(model.tendon(name).id)
-        self._is_open = False
-
-    def set(self, value: float | None, battery_v: float) -> None:
-        """Set a share of the battery's voltage, -1 to 1; None disconnects the motor."""
-        self._is_open = value is None
-        self._ctrl[self._actuator] = (
-            self._motor.volts_per_speed * self._velocity[self._tendon]
-            if value is None
-            else min(1.0, max(-1.0, value)) * battery_v
-        )
-
-    def current_a(self) -> float:
-        """Current from the battery, A."""
-        if self._is_open:
-            return 0.0
-        speed = float(self._velocity[self._tendon])
-        return self._motor.amperes(float(self._ctrl[self._actuator]), speed)
-
-    def rate(self) -> float:
-        """Speed of the shaft, rad/s."""
-        return float(self._velocity[self._tendon])
-
-
 class BoundVehicle(ABC):
     """A vehicle in a running simulation. Its origin is on the ground below its middle.
 
@@ -80,16 +47,24 @@ class BoundVehicle(ABC):
         model: Compiled model with the vehicle.
         data: Its state.
         motor: Motor of each tendon; a tendon is named "vehicle/" plus the part that it drives.
+        full_lock: Angle of its wheels or its rudder at a steering of 1, rad.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, motor: DcMotor) -> None:
-        self._model = model
-        self._data = data
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, motor: DcMotor, full_lock: float = 0.0
+    ) -> None:
+        self._model, self._data, self._motor, self._full_lock = model, data, motor, full_lock
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
-        tendons = (model.tendon(i).name for i in range(model.ntendon))
-        self._drives = {
-            name.removeprefix("vehicle/"): MotorDrive(model, data, name, motor) for name in tendons
+        self._rates = data.ten_velocity  # Speeds of the shafts, rad/s.
+        # Actuator and tendon of each driven part, and the parts that are disconnected.
+        self._shafts = {
+            model.tendon(i).name.removeprefix("vehicle/"): (
+                int(model.actuator(model.tendon(i).name).id),
+                i,
+            )
+            for i in range(model.ntendon)
         }
+        self._open = frozenset[str]()
         self._flow = (0.0, 0.0)
         # Addresses in qpos and qvel of the joints of wheels, rudders and trailers.
         self._joints = [
@@ -115,8 +90,14 @@ class BoundVehicle(ABC):
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
         """Apply outputs and, to a boat, the forces of the water; call it every 10 ms."""
-        for part, drive in self._drives.items():
-            drive.set(outputs.get(part, 0.0), battery_v)
+        self._open = frozenset([part for part in self._shafts if outputs.get(part, 0.0) is None])
+        for part, (actuator, tendon) in self._shafts.items():
+            value = outputs.get(part, 0.0)
+            self._ctrl[actuator] = (
+                self._motor.volts_per_speed * self._rates[tendon]
+                if value is None
+                else min(1.0, max(-1.0, value)) * battery_v
+            )
 
     @abstractmethod
     def motion(self) -> Motion:
@@ -129,8 +110,10 @@ class BoundVehicle(ABC):
     def current_a(self) -> float:
         """Current of the motors, A, >= 0; a braking motor draws none."""
         total_a = 0.0
-        for drive in self._drives.values():
-            total_a += drive.current_a()
+        for part, (actuator, tendon) in self._shafts.items():
+            if part not in self._open:
+                volts, rate = float(self._ctrl[actuator]), float(self._rates[tendon])
+                total_a += self._motor.amperes(volts, rate)
         return total_a
 
     def set_current(self, vx: float, vy: float) -> None:
@@ -138,42 +121,60 @@ class BoundVehicle(ABC):
         self._flow = (vx, vy)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleModel:
-    """A kind of vehicle.
+class Rolling(BoundVehicle):
+    """A vehicle on land."""
 
-    Attributes:
-        name: Name, such as "car".
-        drives: Alternative sets of parts that drive and steer it; a robot has exactly one set.
-        optional_parts: Further parts that a robot may have; they have no effect in simulation.
-        length_m: Length from bumper to bumper, trailer included.
-        width_m: Largest width.
-        nose_m: Distance from the origin to the front bumper.
-        floats: Whether it moves on water.
-        camera: Mount of its camera.
-        top_speed_mps: Speed at full throttle and `BATTERY_V`, on level ground or in still water.
-        turning_radius_m: Radius of the origin's path at full lock; 0 if it turns on the spot.
-        motor: Motor of each of its driving parts.
-        bind: Finds its joints and motors in a compiled model.
-    """
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, motor: DcMotor, full_lock: float
+    ) -> None:
+        super().__init__(model, data, motor, full_lock)
+        root = model.joint("vehicle/chassis")
+        self._qpos0, self._qvel0 = int(root.qposadr[0]), int(root.dofadr[0])
+        geoms = map(model.geom, range(model.ngeom))
+        self._radius = next(float(geom.size[0]) for geom in geoms if geom.name.endswith(" wheel"))
+        self._steering = 0.0
+        if full_lock:
+            self._servos = [model.actuator(f"vehicle/{n} steering").id for n in ("left", "right")]
+            knuckle, rear = map(model.body, ("vehicle/left knuckle", "vehicle/rear left wheel"))
+            self._wheelbase = float(knuckle.pos[0] - rear.pos[0])
+            self._half_gauge = float(knuckle.pos[1])
 
-    name: str
-    drives: tuple[frozenset[str], ...]
-    optional_parts: frozenset[str] = frozenset()
-    length_m: float
-    width_m: float
-    nose_m: float
-    floats: bool = False
-    camera: CameraMount
-    top_speed_mps: float
-    turning_radius_m: float
-    motor: DcMotor
-    bind: Callable[[mujoco.MjModel, mujoco.MjData], BoundVehicle]
+    def _place_chassis(self, x: float, y: float, heading: float) -> None:
+        self._steering = 0.0
+        p, v = self._qpos0, self._qvel0
+        half = heading / 2
+        self._qpos[p : p + 7] = (x, y, 0.0, math.cos(half), 0.0, 0.0, math.sin(half))
+        self._qvel[v : v + 6] = 0.0
 
-    @property
-    def parts(self) -> frozenset[str]:
-        """All parts that have an effect."""
-        return frozenset[str]().union(*self.drives)
+    def drive(self, outputs: Outputs, battery_v: float) -> None:
+        """Set the voltages of the motors and the angles of the front wheels.
+
+        All wheels roll around one point on the line of the rear axle (Ackermann's condition).
+        """
+        super().drive(outputs, battery_v)
+        steering = outputs.get("steering", 0.0)
+        if not self._full_lock or steering is None or steering == self._steering:
+            return
+        self._steering = steering
+        angle = -min(1.0, max(-1.0, steering)) * self._full_lock
+        curvature = math.tan(angle) / self._wheelbase
+        along, half = self._wheelbase * curvature, curvature * self._half_gauge
+        for servo, shorter in zip(self._servos, (half, -half), strict=True):
+            self._ctrl[servo] = math.atan(along / (1.0 - shorter))
+
+    def motion(self) -> Motion:
+        """Current pose and velocity."""
+        p, v = self._qpos0, self._qvel0
+        x, y, _, qw, qx, qy, qz = self._qpos[p : p + 7].tolist()
+        vx, vy, _, _, _, yaw_rate = self._qvel[v : v + 6].tolist()
+        heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        cosine, sine = math.cos(heading), math.sin(heading)
+        return Motion(x, y, heading, vx * cosine + vy * sine, vy * cosine - vx * sine, yaw_rate)
+
+    def travelled_m(self) -> float:
+        """Mean distance that the driven wheels rolled since `place`, m."""
+        # Each tendon measures the angle of one shaft, rad.
+        return self._radius * sum(self._data.ten_length.tolist()) / len(self._shafts)
 
 
 BUMPER_SPREAD: Final = math.radians(60.0)

@@ -21,16 +21,16 @@ class CameraMount:
 
     Attributes:
         x: Position ahead of the vehicle's origin, m.
-        y: Position to the left of it, m.
         z: Height above the ground, m.
+        y: Position to the left of the origin, m.
         pitch_rad: Angle of the optical axis below the horizon.
         fovy_deg: Vertical field of view.
     """
 
     x: float
-    y: float
     z: float
-    pitch_rad: float
+    y: float = 0.0
+    pitch_rad: float = 0.0
     fovy_deg: float = PI_CAMERA_FOVY_DEG
 
     def aimed(self, pitch_deg: float | None, fovy_deg: float | None) -> CameraMount:
@@ -179,37 +179,6 @@ class DcMotor:
             motor.biasprm[2] = -self.damping
 
 
-@dataclass(frozen=True, slots=True)
-class ServoMotor:
-    """A hobby servo, which turns to an angle at a limited speed and holds it.
-
-    Attributes:
-        stall_torque: Largest torque, N·m.
-        free_rate: Speed without load, rad/s.
-        error_at_stall: Smallest error of its angle at which it gives its largest torque, rad.
-    """
-
-    stall_torque: float
-    free_rate: float
-    error_at_stall: float = math.radians(4.0)  # An estimate; cheap ones hold to a few degrees.
-
-    @property
-    def damping(self) -> float:
-        """Damping of its joint, N·m·s/rad: at full torque it turns at the free rate."""
-        return self.stall_torque / self.free_rate
-
-    def add(self, spec: mujoco.MjSpec) -> None:
-        """Let one servo turn all steering joints of a vehicle, controlled by their angles, rad."""
-        joints = [joint for joint in spec.joints if joint.classname.name == "steering"]
-        for joint in joints:
-            joint.damping[0] = self.damping / len(joints)
-            torque = self.stall_torque / len(joints)
-            servo = spec.actuator(joint.name)
-            servo.gainprm[0] = torque / self.error_at_stall
-            servo.biasprm[1] = -servo.gainprm[0]
-            servo.forcelimited, servo.forcerange = True, [-torque, torque]
-
-
 # Pololu item 4801, a motor of 25 mm with a gear of 4.4:1: https://www.pololu.com/product/4801. At
 # 6 V it runs freely at 2200 rpm with 0.5 A, and stalls at 6 A with 1.2 kgf·cm.
 HOBBY_MOTOR: Final = DcMotor(
@@ -222,8 +191,22 @@ HOBBY_MOTOR: Final = DcMotor(
 )
 """Motor of all vehicles here, each with a further gear stage."""
 
-HOBBY_SERVO: Final = ServoMotor(
-    # Hitec HS-311 at 4.8 V: 3.0 kgf·cm, 60 degrees in 0.19 s, by its data sheet.
-    stall_torque=3.0 * _KGF_CM,
-    free_rate=math.radians(60.0) / 0.19,
-)
+# Hitec HS-311 at 4.8 V: 3.0 kgf·cm, 60 degrees in 0.19 s, by its data sheet. The smallest error of
+# its angle at which it gives its largest torque is an estimate; cheap ones hold to a few degrees.
+_STALL_TORQUE, _FREE_RATE = 3.0 * _KGF_CM, math.radians(60.0) / 0.19  # N·m and rad/s.
+_ERROR_AT_STALL: Final = math.radians(4.0)
+
+
+def add_servo(spec: mujoco.MjSpec) -> None:
+    """Let one hobby servo turn all steering joints of a vehicle, controlled by their angles, rad.
+
+    It turns to an angle at a limited speed and holds it: at full torque it turns at its free rate.
+    """
+    joints = [joint for joint in spec.joints if joint.classname.name == "steering"]
+    for joint in joints:
+        torque = _STALL_TORQUE / len(joints)
+        joint.damping[0] = _STALL_TORQUE / _FREE_RATE / len(joints)
+        servo = spec.actuator(joint.name)
+        servo.gainprm[0] = torque / _ERROR_AT_STALL
+        servo.biasprm[1] = -servo.gainprm[0]
+        servo.forcelimited, servo.forcerange = True, [-torque, torque]
