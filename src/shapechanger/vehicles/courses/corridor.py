@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Course, Lamp, Surface, Wall
-from shapechanger.vehicles.courses.furniture import LaneObstacles, Size, weighted_choice
+from shapechanger.vehicles.courses.furniture import LaneObstacles, Scatter, weighted_choice
 from shapechanger.vehicles.courses.geometry import (
     Array,
     arc_lengths,
@@ -98,14 +98,13 @@ _GAP_M, _SPACING_M = 0.9, 0.1
 
 # Furniture along the walls, with the depth as the width; common sizes.
 _FURNITURE = (
-    Size("box", (0.3, 0.6), (0.25, 0.45), (0.2, 0.5)),
-    Size("bin", (0.25, 0.35), (0.25, 0.35), (0.5, 0.7)),
-    Size("bench", (1.2, 1.6), (0.38, 0.45), (0.42, 0.48)),
-    Size("plant", (0.3, 0.45), (0.3, 0.45), (0.8, 1.5)),
-    Size("cabinet", (0.8, 1.2), (0.4, 0.5), (1.0, 1.9)),
-    Size("crate", (0.4, 0.6), (0.3, 0.4), (0.25, 0.4)),
+    Scatter("box", (0.3, 0.6), (0.25, 0.45), (0.2, 0.5), 0.2),
+    Scatter("bin", (0.25, 0.35), (0.25, 0.35), (0.5, 0.7), 0.2),
+    Scatter("bench", (1.2, 1.6), (0.38, 0.45), (0.42, 0.48), 0.18),
+    Scatter("plant", (0.3, 0.45), (0.3, 0.45), (0.8, 1.5), 0.18),
+    Scatter("cabinet", (0.8, 1.2), (0.4, 0.5), (1.0, 1.9), 0.14),
+    Scatter("crate", (0.4, 0.6), (0.3, 0.4), (0.25, 0.4), 0.1),
 )
-_FURNITURE_SHARES = (0.2, 0.2, 0.18, 0.18, 0.14, 0.1)
 
 
 def corridor(rng: np.random.Generator, seed: int) -> Course | None:
@@ -202,7 +201,7 @@ def _furnish(
         length = float(lengths[k])
         yaw = float(np.arctan2(ahead[k, 1], ahead[k, 0]))
         for _ in range(rng.poisson(density * length)):
-            size = _FURNITURE[weighted_choice(rng, _FURNITURE_SHARES)]
+            size = _FURNITURE[weighted_choice(rng, [kind.share for kind in _FURNITURE])]
             t = float(rng.uniform(1.2, length - 1.2))
             side = 1.0 if rng.random() < 0.5 else -1.0
             obstacle = size.draw(rng, yaw)

@@ -40,13 +40,15 @@ _BEFORE_DOORS_M: Final = 0.3  # Smallest distance from a door.
 
 
 @dataclass(frozen=True, slots=True)
-class Size:
-    """Ranges of the size of a kind of obstacle, m."""
+class Scatter:
+    """A kind of obstacle; `open_worlds.toml` describes its numbers."""
 
     kind: ObstacleKind
     length: tuple[float, float]
     width: tuple[float, float]
     height: tuple[float, float]
+    share: float
+    moored: float = 0.0
 
     def draw(self, rng: np.random.Generator, yaw: float) -> Obstacle:
         """Draw an obstacle at the origin; a round one is as wide as long, and its yaw is 0."""
@@ -109,19 +111,6 @@ class LaneObstacles:
         self.gap_m = min(self.gap_m, narrowest)
         self.obstacles.append(obstacle)
         self._passed_left.append(passed_left)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scatter(Size):
-    """A kind of obstacle to scatter.
-
-    Attributes:
-        share: Weight with which it is drawn.
-        moored: Probability of lying along a wall.
-    """
-
-    share: float
-    moored: float = 0.0
 
 
 def scatter_obstacles(

@@ -190,34 +190,6 @@ def glass(rng: np.random.Generator) -> Field:
     return image
 
 
-def floor(rng: np.random.Generator) -> Field:
-    """Polished concrete, 3 m wide, with blotches and specks."""
-    hue = np.array([0.56, 0.54, 0.42]) + rng.uniform(-0.04, 0.04, 3)
-    image = plain(hue, _TALL, _TALL)
-    image *= 1.0 + 0.10 * clouds(rng, _TALL, _TALL, 5, 5, 4)[..., None]
-    image *= 1.0 + 0.05 * grain(rng, _TALL, _TALL)[..., None]
-    return image * (1.0 - 0.12 * np.clip(clouds(rng, _TALL, _TALL, 3, 3, 5), 0.0, 2.0)[..., None])
-
-
-def ceiling(rng: np.random.Generator) -> Field:
-    """Pale ceiling tiles, 0.6 m wide."""
-    image = plain((0.60, 0.58, 0.46))
-    image *= 1.0 + 0.05 * grain(rng, _SIZE, _SIZE)[..., None]
-    image[::64] *= 0.7
-    image[:, ::64] *= 0.7
-    return image
-
-
-def hedge(rng: np.random.Generator) -> Field:
-    """Hedge, darker below and between the twigs."""
-    leaves = clouds(rng, _SIZE, _SIZE, 24, 24, 3)
-    image = np.asarray((0.20, 0.34, 0.10), np.float32) * (1.0 + 0.32 * leaves[..., None])
-    image *= 1.0 + 0.18 * clouds(rng, _SIZE, _SIZE, 3, 4, 2)[..., None]
-    image = blend(image, (0.45, 0.52, 0.18), np.clip(leaves - 1.2, 0.0, 1.0) * 0.6)
-    up = np.linspace(1.15, 0.55, _SIZE, dtype=np.float32)[:, None, None]
-    return image * up
-
-
 def fence(rng: np.random.Generator) -> Field:
     """Eight upright planks with gaps, and rails behind them."""
     planks = 8
@@ -253,14 +225,6 @@ def quay(rng: np.random.Generator) -> Field:
     return blend(image, (0.13, 0.17, 0.10), np.clip((down - edge) * 8.0, 0.0, 0.85))
 
 
-def rock(rng: np.random.Generator) -> Field:
-    """Rough grey stone with a dark foot."""
-    rough = clouds(rng, _SIZE, _SIZE, 5, 5, 4)
-    image = np.asarray((0.42, 0.40, 0.37), np.float32) * (1.0 + 0.24 * rough[..., None])
-    up = np.linspace(1.1, 0.55, _SIZE, dtype=np.float32)[:, None, None]
-    return image * up
-
-
 def asphalt(rng: np.random.Generator) -> Field:
     """Worn asphalt, 3 m wide, with stones, cracks and leaves."""
     image = plain((0.40, 0.39, 0.37), _TALL, _TALL)
@@ -270,22 +234,6 @@ def asphalt(rng: np.random.Generator) -> Field:
     image = blend(image, (0.16, 0.16, 0.15), cracks.astype(np.float32) * 0.8)
     leaves = clouds(rng, _TALL, _TALL, 64, 64, 1) > 2.4
     return blend(image, (0.42, 0.30, 0.12), leaves.astype(np.float32))
-
-
-def grass(rng: np.random.Generator) -> Field:
-    """Short grass with bare patches."""
-    image = plain((0.30, 0.42, 0.15))
-    image *= 1.0 + 0.22 * clouds(rng, _SIZE, _SIZE, 40, 40, 2)[..., None]
-    bare = np.clip(clouds(rng, _SIZE, _SIZE, 3, 3, 3) - 0.6, 0.0, 1.0)
-    return blend(image, (0.42, 0.36, 0.22), bare * 0.7)
-
-
-def water(rng: np.random.Generator) -> Field:
-    """Green water, 4 m wide, with ripples."""
-    ripples = clouds(rng, _TALL, _TALL, 24, 10, 3)
-    image = np.asarray((0.20, 0.32, 0.33), np.float32) * (1.0 + 0.20 * ripples[..., None])
-    image *= 1.0 + 0.10 * clouds(rng, _TALL, _TALL, 3, 3, 2)[..., None]
-    return blend(image, (0.75, 0.82, 0.84), np.clip(ripples - 1.6, 0.0, 1.0) * 0.5)
 
 
 def sea(rng: np.random.Generator) -> Field:
@@ -373,51 +321,75 @@ def sky(rng: np.random.Generator) -> Field:
 
 
 _CELL, _ROWS = 64, 4
-_SHEETS: Final = tomllib.loads(Path(__file__).with_name("cells.toml").read_text("utf-8"))
+_LAYERED, _SHEETS = (
+    tomllib.loads(Path(__file__).with_name(name).read_text("utf-8"))
+    for name in ("layers.toml", "cells.toml")
+)
 
 
-def _sheet(name: str, rng: np.random.Generator) -> Field:
+def _layered(
+    rng: np.random.Generator,
+    colour: ArrayLike,
+    size: int = _SIZE,
+    hue: float = 0.0,
+    layers: Sequence[Mapping[str, Any]] = (),
+    fill: Sequence[Any] = (),
+    times: Sequence[Any] = (),
+    light: tuple[float, float] | None = None,
+) -> Field:
+    """Texture of layers; `layers.toml` describes them."""
+    image = plain(np.add(colour, rng.uniform(-hue, hue, 3)) if hue else colour, size, size)
+    fields: list[Field] = []
+    for layer in layers:
+        if "of" in layer:
+            fields.append(fields[int(layer["of"])])
+        elif "clouds" in layer:
+            fields.append(clouds(rng, size, size, *layer["clouds"]))
+        else:
+            fields.append(grain(rng, size, size))
+        field = np.clip(fields[-1], *layer.get("limits", (-np.inf, np.inf)))
+        if "times" in layer:
+            image *= 1.0 + layer["times"] * field[..., None]
+        else:
+            opacity = np.clip(field - layer["above"], 0.0, 1.0) * layer["share"]
+            image = blend(image, layer["colour"], opacity)
+    for top, bottom, left, right, *value in fill:
+        image[top:bottom, left:right] = value
+    for top, bottom, left, right, factor in times:
+        image[top:bottom, left:right] *= factor
+    if light:
+        image *= np.linspace(*light, size, dtype=np.float32)[:, None, None]
+    return image
+
+
+def _sheet(rng: np.random.Generator, name: str) -> Field:
     """Texture of many solids, with one cell for each material in `cells.toml`, (256, 256, 3)."""
     image = np.zeros((_ROWS * _CELL, _ROWS * _CELL, 3), np.float32)
     for i, cell in enumerate(_SHEETS[name].values()):
         row, column = (_CELL * k for k in divmod(i, _ROWS))
-        image[row : row + _CELL, column : column + _CELL] = _cell(rng, **cell)
+        colour, layers = np.asarray(cell["colour"], np.float32), list[Mapping[str, Any]]()
+        if not cell.get("even"):
+            colour = colour * (1.0 + rng.uniform(-0.1, 0.1, 3).astype(np.float32))
+            layers = [{"times": 0.04}]
+        if "patches" in cell:
+            strength, *shape = cell["patches"]
+            layers.append({"clouds": shape, "times": strength})
+        fill, times = cell.get("fill", ()), cell.get("times", ())
+        painted = _layered(rng, colour, _CELL, layers=layers, fill=fill, times=times)
+        image[row : row + _CELL, column : column + _CELL] = painted
     return image
-
-
-def _cell(
-    rng: np.random.Generator,
-    colour: Sequence[float],
-    patches: Sequence[Any] = (),
-    fill: Sequence[Any] = (),
-    times: Sequence[Any] = (),
-    even: bool = False,
-) -> Field:
-    """One cell, (64, 64, 3)."""
-    cell = plain(colour, _CELL, _CELL)
-    if even:
-        return cell
-    cell *= 1.0 + rng.uniform(-0.1, 0.1, 3).astype(np.float32)
-    cell *= 1.0 + 0.04 * grain(rng, _CELL, _CELL)[..., None]
-    if patches:
-        strength, *shape = patches
-        cell *= 1.0 + strength * clouds(rng, _CELL, _CELL, *shape)[..., None]
-    for top, bottom, left, right, *value in fill:
-        cell[top:bottom, left:right] = value
-    for top, bottom, left, right, factor in times:
-        cell[top:bottom, left:right] *= factor
-    return cell
 
 
 PAINTERS: Final[Mapping[str, Callable[[np.random.Generator], Field]]] = MappingProxyType(
     {
         painter.__name__: painter
         for painter in (
-            plaster, panel, door, window, brick, board, glass, floor, ceiling, hedge, fence, shed,
-            quay, rock, asphalt, grass, water, sea, paving, shore, sky,
+            plaster, panel, door, window, brick, board, glass, fence, shed, quay, asphalt, sea,
+            paving, shore, sky,
         )
     }
-    | {name: functools.partial(_sheet, name) for name in _SHEETS}
+    | {name: functools.partial(_layered, **layered) for name, layered in _LAYERED.items()}
+    | {name: functools.partial(_sheet, name=name) for name in _SHEETS}
 )  # fmt: skip
 """Painters of the textures, keyed by name."""
 

@@ -32,7 +32,13 @@ COLLISION_REWARD: Final = -3.0
 # distance without a price for it, but once nearer they squeezed through where a camera that sees 31
 # degrees to each side must guess; with it they brake and back out, and a student learns that too.
 _NEAR_M, _NEAR_COST = 0.35, 3.0
-_FASTEST_MPS, _FASTEST_TURN = 5.0, 15.0  # m/s and rad/s.
+_LAYOUT: Final = Layout(
+    (
+        *(Feature(f"range/{bearing:+d}deg", "m", 0.0, FARTHEST_M) for bearing in BEARINGS_DEG),
+        Feature("speed", "m/s", -5.0, 5.0),
+        Feature("yaw_rate", "rad/s", -15.0, 15.0),
+    )
+)
 _COURSES: Final = range(48)  # To train on. The models of this many stay compiled.
 
 
@@ -40,9 +46,6 @@ class MeanOutputs:
     """Mean outputs of control periods, from rest, without sensors and the steps of outputs.
 
     It leaves out deadlines, which a simulated command never misses, and stalls.
-
-    Args:
-        plan: Plan of the guard.
     """
 
     def __init__(self, plan: GuardPlan) -> None:
@@ -95,14 +98,10 @@ def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
 
 
 def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
-    """Return an action that moves a standing vehicle, unless its throttle is exactly 0.
+    """Return steering and throttle, (2,), that move a standing vehicle unless the throttle is 0.
 
     A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest:
     the vehicle would stand for good. In training, exploration moved it.
-
-    Args:
-        action: Steering and throttle, shape (2,).
-        stands: Whether the vehicle stands.
     """
     steering, throttle = action
     if not stands or throttle == 0.0 or abs(throttle) >= LEAST_THROTTLE:
@@ -165,23 +164,13 @@ class RangesEnv(DriveEnv):
     v1: the first.
 
     Args:
-        vehicle: "car", "tank", "boat" or "truck".
-        world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the vehicle's
-            usual place.
-        robot: Path or name of a profile; None for `lab-` followed by the vehicle.
+        vehicle, world, robot, randomise, render_mode: As of `VehicleEnv`, with its errors.
         reward: Weights that replace the default ones, keyed by name; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default
             is 48 training courses, which are laid out once.
-        randomise: Whether `reset` samples light, textures and the camera's pose too.
         put_back: Whether to put the vehicle back on the lane after a collision, where its bumper's
             reflex keeps it from going forward for 0.75 s.
         camera: Whether `world.picture()` shows the images of the profile's camera.
-        render_mode: "rgb_array" for `render` to return the camera's image.
-
-    Raises:
-        UnknownName: If there is no such vehicle, world, profile or weight.
-        ProfileError: If the profile moves other parts than the vehicle has.
-        WorldError: If the vehicle cannot drive in the world.
     """
 
     def __init__(
@@ -204,17 +193,10 @@ class RangesEnv(DriveEnv):
             coarse=True,
         )  # fmt: skip
         self._plan = profile.plan
-        self._ticks = round(1.0 / (profile.control_hz * (1.0 / self._plan.tick_hz)))
+        self._ticks = round(self._plan.tick_hz / profile.control_hz)
         self._period_s = 1.0 / profile.control_hz
-        bearings = (f"range/{bearing:+d}deg" for bearing in BEARINGS_DEG)
-        self.observation_layout = Layout(
-            (
-                *(Feature(name, "m", low=0.0, high=FARTHEST_M) for name in bearings),
-                Feature("speed", "m/s", low=-_FASTEST_MPS, high=_FASTEST_MPS),
-                Feature("yaw_rate", "rad/s", low=-_FASTEST_TURN, high=_FASTEST_TURN),
-            )
-        )
-        self.observation_space = space = space_of(self.observation_layout)
+        self.observation_layout = _LAYOUT
+        self.observation_space = space = space_of(_LAYOUT)
         self._low, self._high = space.low, space.high
 
     def _begin(self) -> None:

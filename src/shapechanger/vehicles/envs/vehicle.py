@@ -267,28 +267,22 @@ class WaypointEnv(WaypointView, DriveEnv):
     v1: the first.
 
     Args:
-        vehicle: "car", "tank", "boat" or "truck".
+        vehicle, robot, courses, render_mode: As of `VehicleEnv`, with its errors.
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
             for a boat, so that vehicles differ in their bodies alone.
-        robot: Path or name of a profile; None for `lab-` followed by the vehicle.
         sensed: Whether speed and reward are those that the sensors of `VehicleEnv` measure, instead
             of the true ones; its physics takes shorter steps, too.
-        courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
         randomise: Whether `reset` samples light, textures and the camera's pose too. Images are
             warped as if the camera were in its place, so a policy sees the error of the pose.
         put_back: Whether to put the vehicle back on the lane after a collision. A collision then
             does not end the episode.
-        render_mode: "rgb_array" for `render` to return the camera's image as it is.
 
     Attributes:
         parts: The parts that the robot's outputs move.
         response: How the vehicle turns.
 
     Raises:
-        UnknownName: If there is no such vehicle, world, profile or kind of courses.
-        ProfileError: If the profile moves other parts than the vehicle has, or has no camera that
-            sees what policies for all vehicles look at.
-        WorldError: If the vehicle cannot drive in the world.
+        ProfileError: If the robot has no camera that sees what policies for all vehicles look at.
     """
 
     certify_shift = staticmethod(certify_vehicles)
