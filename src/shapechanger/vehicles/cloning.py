@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -23,12 +23,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.env_ref import (
-    EnvRef,
-    EnvTraits,
-    TaskDemonstrator,
-    layouts_of,
-)
+from shapechanger.contract.env_ref import EnvRef, EnvTraits, TaskDemonstrator, layouts_of
 from shapechanger.demos.cloning.clone import CloneSettings, load_clone, prepare
 from shapechanger.demos.cloning.learn import learn
 from shapechanger.demos.cloning.network import CameraPolicy
@@ -39,18 +34,8 @@ from shapechanger.layout import Layout
 from shapechanger.policy import Framing, PolicyCard
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.identities import ENV, identify, known, require_same_env
-from shapechanger.transfer.learners import (
-    Learner,
-    LearnerSettings,
-    SharedFile,
-    Takes,
-    ignore,
-)
-from shapechanger.transfer.learners.evaluation import (
-    EVALUATION_SEED,
-    Evaluation,
-    evaluate,
-)
+from shapechanger.transfer.learners import Learner, LearnerSettings, SharedFile, Takes, ignore
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Evaluation, evaluate
 from shapechanger.vehicles.expert import PERIOD_S
 from shapechanger.vehicles.waypoints import LEAST_THROTTLE
 
@@ -118,7 +103,7 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
         )
 
 
-def drive(
+def _drive(
     env: gym.Env[Any, Any],
     demonstrator: TaskDemonstrator,
     steps: int,
@@ -129,14 +114,8 @@ def drive(
 ) -> Dataset:
     """Drive, and record frames as a policy sees them, with what a demonstrator intended at each.
 
-    Args:
-        env: An env of a camera.
-        demonstrator: Its demonstrator.
-        steps: Number of steps.
-        framing: Part of the frame that is recorded.
-        seed: Seed of the first reset.
-        chosen: Returns the action to take, for a frame and the demonstrator's disturbed action.
-        on_steps: Called with the number of steps driven, after each episode.
+    `chosen` returns the action to take, for a frame and the demonstrator's disturbed action, and
+    `on_steps` is called with the number of steps driven, after each episode.
     """
     pictures: list[NDArray[np.uint8]] = []
     actions = np.empty((steps, 2), np.float32)
@@ -167,13 +146,13 @@ def _dataset(
 def record_demonstrations(
     env: EnvRef, steps: int, episode_steps: int, seed: int, framing: Framing
 ) -> Dataset:
-    """Record the demonstrator of an env, as `drive` does."""
+    """Record the demonstrator of an env, which takes its disturbed actions."""
     with closing(env.make(max_episode_steps=episode_steps)) as made:
         inner: Any = made.unwrapped
         if not hasattr(inner, "demonstrator"):
             raise StudyError(f"{env} has no demonstrator to learn from.")
         driver = inner.demonstrator(seed)
-        return drive(made, driver, steps, framing, seed, lambda _, disturbed: disturbed)
+        return _drive(made, driver, steps, framing, seed, lambda _, disturbed: disturbed)
 
 
 def load_or_record(
@@ -209,11 +188,8 @@ class CloneLearner(Learner[CloningSettings]):
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
         """Refuse an env without a camera or a demonstrator."""
         space = traits.observation_space
-        is_camera = (
-            isinstance(space, gym.spaces.Box)
-            and np.dtype(np.uint8) == cast("Any", space).dtype
-            and len(space.shape) == 3
-        )
+        is_image = isinstance(space, gym.spaces.Box) and len(space.shape) == 3
+        is_camera = is_image and cast("Any", space).dtype == np.uint8
         if not is_camera or not traits.has_demonstrator:
             raise StudyError(
                 f"{env} has no {'demonstrator' if is_camera else 'camera'}, and {self.name} learns "
@@ -256,13 +232,9 @@ class CloneLearner(Learner[CloningSettings]):
             if budget > steps:
                 break
             policy, _ = learn(
-                _first(recorded, budget),
-                settings=settings,
-                seed=own_seed,
-                start=start,
-                rehearsal=mixed,
-                symmetric=True,
-            )
+                _first(recorded, budget), settings=settings, seed=own_seed, start=start,
+                rehearsal=mixed, symmetric=True,
+            )  # fmt: skip
             on_evaluation(msgspec.structs.replace(self.evaluate(env, policy), steps=budget))
             on_steps(budget)
         return stated(policy, env, steps, seed)
@@ -272,12 +244,9 @@ class CloneLearner(Learner[CloningSettings]):
     ) -> Evaluation:
         """Evaluate a policy."""
         del body_map
-        envs = self.evaluation_envs(env)
-        try:
+        with ExitStack() as stack:
+            envs = [stack.enter_context(closing(one)) for one in self.evaluation_envs(env)]
             return evaluate(policy.predict_many, envs, EVALUATION_SEED)
-        finally:
-            for one in envs:
-                one.close()
 
     def load(self, path: Path) -> CameraPolicy:
         """Load a clone."""
@@ -369,15 +338,11 @@ def train_student(
         driver = inner.taught_by(teacher.act, seed)
 
         def lesson(steps: int, before: int = 0, student: CameraPolicy | None = None) -> Dataset:
-            return drive(
-                made,
-                driver,
-                steps,
-                settings.framing,
-                seed if student is None else None,
+            return _drive(
+                made, driver, steps, settings.framing, seed if student is None else None,
                 lambda seen, act: _moving(act) if student is None else student.predict(seen),
                 lambda done: on_steps(before + done),
-            )
+            )  # fmt: skip
 
         each = steps // (1 + _ROUNDS)
         shown = [lesson(steps - _ROUNDS * each)]

@@ -213,7 +213,6 @@ def command(
 
 
 def _numbers(seen: Any) -> NDArray[np.float32]:
-    """Return the numbers of an observation, which may have a frame, too."""
     return cast("Any", seen)["state"] if isinstance(seen, dict) else seen
 
 
@@ -238,14 +237,9 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
     ) -> None:
         """Wrap another env, whose actions are steering and throttle.
 
-        Args:
-            env: The env.
-            robot: Name of its robot or profile, for errors.
-            camera: Pitch and vertical field of view of its camera, degrees, and width and height of
-                its frames, pixels; None if unknown.
-            sensors: Quantities that it must measure, "speed" first.
-            error: Error to raise if something is unknown, or the camera sees too little.
-            turns_on_the_spot: Whether the vehicle turns by its tracks.
+        `camera` is pitch, vertical field of view, degrees, and size of frames; None if unknown.
+        `sensors` are what it must measure, "speed" first. `error` is raised, with the name of the
+        `robot`, if something is unknown, or the camera sees too little.
         """
         pitch, fovy, size = camera
         slices = env.observation_layout.slices
@@ -366,11 +360,8 @@ def waypoints_of(
 class WaypointDemonstrations(NamedTuple):
     """Demonstrations with waypoints as actions.
 
-    Attributes:
-        data: The demonstrations.
-        kept: Mask of the given steps that were converted, shape (n,).
-        response: How the vehicle that was driven turns.
-        notes: Sentences for people to read.
+    `kept` is the mask of the given steps that were converted, shape (n,), `response` how the
+    vehicle that was driven turns, and `notes` are sentences for people to read.
     """
 
     data: Dataset

@@ -23,15 +23,13 @@ from shapechanger.vehicles.courses.geometry import (
     any_crossing,
     arc_lengths,
     even_distances,
-    grow_cells,
     interpolate,
     length,
     normals,
+    random_loop,
     resample,
-    scale_grid,
     smooth,
     tangent_radii,
-    trace_outline,
     turn_angles,
     wall_segments,
 )
@@ -79,10 +77,9 @@ def _dig_channel(rng: np.random.Generator, world: OpenWorld) -> tuple[Array, Arr
     The corners of a loop on a grid are smoothed more and more until the lane fits everywhere. None
     if the random loop is too tight or too close to itself.
     """
-    loop = trace_outline(grow_cells(rng, int(rng.integers(world.cells[0], world.cells[1] + 1))))
-    if loop is None:
+    points = random_loop(rng, int(rng.integers(world.cells[0], world.cells[1] + 1)), world.pitch)
+    if points is None:
         return None
-    points = scale_grid(rng, loop, *world.pitch)
     points += rng.normal(0.0, 0.1 * world.pitch[0], size=points.shape)
     if rng.random() < 0.5:
         points = points[::-1]

@@ -14,10 +14,8 @@ from shapechanger.vehicles.courses.furniture import LaneObstacles, Scatter, weig
 from shapechanger.vehicles.courses.geometry import (
     Array,
     arc_lengths,
-    grow_cells,
+    random_loop,
     resample,
-    scale_grid,
-    trace_outline,
     turn_angles,
 )
 
@@ -142,10 +140,9 @@ def corridor(rng: np.random.Generator, seed: int) -> Course | None:
 
 def _corners(rng: np.random.Generator) -> Array | None:
     """Corners of the route in driving direction, the longest leg first, m, (n, 2)."""
-    loop = trace_outline(grow_cells(rng, int(rng.integers(3, 8))))
-    if loop is None:
+    points = random_loop(rng, int(rng.integers(3, 8)), _PITCH_M)
+    if points is None:
         return None
-    points = scale_grid(rng, loop, *_PITCH_M)
     if rng.random() < 0.5:
         points = points[::-1]
     points = points[_turns(points) != 0]

@@ -100,16 +100,23 @@ Cell = tuple[int, int]
 _SIDES = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
-def grow_cells(rng: np.random.Generator, size: int) -> frozenset[Cell]:
-    """Grow a random set of `size` cells that are connected by their sides.
+def random_loop(rng: np.random.Generator, size: int, pitch_m: tuple[float, float]) -> Array | None:
+    """Draw a loop around `size` cells that are connected by their sides, m, (n, 2).
 
-    The set may have holes, and cells that touch at a corner only; `trace_outline` rejects those.
+    Rows and columns of cells have random widths in the range of the pitch. Returns None if the
+    cells have holes, or touch at a corner.
     """
     cells: set[Cell] = {(0, 0)}
     while len(cells) < size:
         around = sorted({(x + i, y + j) for x, y in cells for i, j in _SIDES} - cells)
         cells.add(around[int(rng.integers(len(around)))])
-    return frozenset(cells)
+    loop = trace_outline(frozenset(cells))
+    if loop is None:
+        return None
+    steps = rng.uniform(*pitch_m, size=(2, int(np.ptp(loop)) + 2))
+    lines = np.cumsum(steps, axis=1)
+    shifted = loop - loop.min(axis=0)
+    return np.stack([lines[0, shifted[:, 0]], lines[1, shifted[:, 1]]], axis=1)
 
 
 def trace_outline(cells: frozenset[Cell]) -> NDArray[np.int64] | None:
@@ -132,16 +139,6 @@ def trace_outline(cells: frozenset[Cell]) -> NDArray[np.int64] | None:
     while (point := edges[loop[-1]]) != first:
         loop.append(point)
     return np.array(loop) if len(loop) == count else None
-
-
-def scale_grid(
-    rng: np.random.Generator, loop: NDArray[np.int64], shortest_m: float, longest_m: float
-) -> Array:
-    """Scale a loop of grid points, (n, 2), to metres; each row and column has a random width."""
-    steps = rng.uniform(shortest_m, longest_m, size=(2, int(np.ptp(loop)) + 2))
-    lines = np.cumsum(steps, axis=1)
-    shifted = loop - loop.min(axis=0)
-    return np.stack([lines[0, shifted[:, 0]], lines[1, shifted[:, 1]]], axis=1)
 
 
 Segments = NDArray[np.float64]

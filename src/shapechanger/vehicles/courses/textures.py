@@ -367,7 +367,8 @@ def _sheet(rng: np.random.Generator, name: str) -> Field:
     image = np.zeros((_ROWS * _CELL, _ROWS * _CELL, 3), np.float32)
     for i, cell in enumerate(_SHEETS[name].values()):
         row, column = (_CELL * k for k in divmod(i, _ROWS))
-        colour, layers = np.asarray(cell["colour"], np.float32), list[Mapping[str, Any]]()
+        colour = np.asarray(cell["colour"], np.float32)
+        layers: list[Mapping[str, Any]] = []
         if not cell.get("even"):
             colour = colour * (1.0 + rng.uniform(-0.1, 0.1, 3).astype(np.float32))
             layers = [{"times": 0.04}]

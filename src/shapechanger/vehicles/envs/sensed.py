@@ -296,7 +296,7 @@ class SensedVehicle:
 
 
 def _stepper(output: OutputPlan) -> Callable[[float], float]:
-    """Return a function that rounds a value to the duties or pulse widths of an output."""
+    """Round values to the duties or pulse widths of an output."""
     settings = output.settings
     if output.driver in ("hbridge", "phase_enable"):
         duty = Duty(settings["start"], settings["full"])

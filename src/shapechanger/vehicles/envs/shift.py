@@ -57,13 +57,8 @@ def certify_vehicles(
 ) -> VehicleShift:
     """Compare two vehicles, wrappers included, and certify the shift between them.
 
-    Both are reset and stepped, and left in the middle of an episode.
-
-    Args:
-        source: The env in which a policy is trained.
-        target: The env that it is transferred to.
-        seed: Seed of the resets.
-        allow_empty: Whether to certify a shift without differences.
+    Both are reset and stepped, and left in the middle of an episode. With `allow_empty`, a shift
+    without differences is certified too.
 
     Raises:
         MorphologyError: If one of them is not a vehicle.
@@ -128,7 +123,6 @@ def _answers(
 
 
 def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
-    """Return the properties of a vehicle, keyed by their names."""
     inner: Any = env.unwrapped
     world: MujocoWorld = inner.world
     model, camera, turning = world.vehicle, world.mount, world.vehicle.turning_radius_m
@@ -153,7 +147,6 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
 
 
 def _name(env: gym.Env[Any, Any]) -> str:
-    """Return the id of a vehicle's env."""
     name = env.spec.id if env.spec else type(env.unwrapped).__name__
     if not (hasattr(env.unwrapped, "world") and hasattr(env.unwrapped, "parts")):
         raise MorphologyError(f"{name} is not a vehicle, so it cannot be compared with one.")
