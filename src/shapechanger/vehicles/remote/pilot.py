@@ -188,7 +188,7 @@ class PolicyDriver:
             "pace": "lockstep" if welcome.clock == "twin" else "realtime",
             "interventions": True,
             "on_reset": "person",
-            "on_waiting": lambda text: self._say(f"{self._why} {self._waits or text}".strip()),
+            "on_waiting": self._wait_for,
             "reset_timeout_s": _LOOK_EVERY_S,
             "name": self._name,
         }
@@ -219,6 +219,9 @@ class PolicyDriver:
         if self._sees and self._feels:
             return observation["image"], observation["state"]
         return (observation, None) if self._sees else (None, observation)
+
+    def _wait_for(self, text: str) -> None:
+        self._say(f"{self._why} {self._waits or text}".strip())
 
     def _say(self, note: str) -> None:
         if note != self.note:
