@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.demos.episodes import Drop, edit, episodes_of, read_episode
-from shapechanger.demos.merging import merge
+from shapechanger.demos.episodes import Drop, edit, episodes_of, merge, read_episode
 from shapechanger.errors import BrokenEpisode, DemosError
 from tests.demos.episodes.making import recorded
 

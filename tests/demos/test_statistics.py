@@ -19,8 +19,8 @@ from shapechanger.demos.episodes import (
     edit,
     read_episode,
 )
+from shapechanger.demos.episodes.records import is_same_rate, rate_jitter
 from shapechanger.demos.report import distributions, recording_html
-from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from tests.demos.episodes.making import header, recorded, step
 
 
@@ -107,4 +107,4 @@ def test_jitter_is_measured_and_bounded() -> None:
 def test_gaps_skip_dropped_steps(tmp_path: Path) -> None:
     path = recorded(tmp_path, 6)
     edit(path, Drop(2, 3, "bad"))
-    assert gaps_s(read_episode(path)) == pytest.approx([0.05, 0.05])
+    assert read_episode(path).gaps_s == pytest.approx([0.05, 0.05])

@@ -1,14 +1,12 @@
 """Demonstrations: recording, reading and exchanging episodes, and policies cloned from them.
 
 ```
-episodes/      the format on disk; standard library only, because robots record too
+episodes/      the format on disk: write, read, repair, edit and merge episodes
 recording.py   record any Gymnasium env
 drivers.py     drivers of recordings: an expert, a policy, or a policy with corrections
 dataset.py     episodes as NumPy arrays
-statistics.py  how far the rate of a recording varies
 report.py      the page of a recording
 replay.py      play an episode in an env, or as a film
-merging.py     copy episodes of several recordings into one
 jpeg.py        images, and actions drawn below them
 exchange/      import and export: csv, minari, tub, lerobot, mcap
 cloning/       behaviour cloning

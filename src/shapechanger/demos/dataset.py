@@ -13,10 +13,9 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step, episodes_of, read_episode
-from shapechanger.demos.episodes.records import is_episode
+from shapechanger.demos.episodes.records import is_episode, is_same_rate, rate_jitter
 from shapechanger.demos.exchange import import_episodes
 from shapechanger.demos.jpeg import decode_picture
-from shapechanger.demos.statistics import is_same_rate, rate_jitter
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 
@@ -126,24 +125,23 @@ def load_dataset(
         if driver not in DRIVERS:
             raise UnknownName("driver", driver, DRIVERS)
     parts: list[Dataset] = []
-    kinds: list[dict[str, object]] = []
+    first: tuple[str, dict[str, Any]] | None = None
     periods_s: list[float] = []
     for name, header, steps in _episodes(data):
         part, periods = _part(name, header, steps, drivers, shrink)
         if part is None:
             continue
-        kind: dict[str, object] = {"actions": header.action_layout, "states": header.state_layout}
-        kind["pictures"] = (header.image_size, part.pictures is None)
-        kinds.append({"name": name, **kind})
+        kind = {"actions": part.action_layout, "states": part.state_layout}
+        kind |= {"pictures": (header.image_size, part.pictures is None)}
+        first = first or (name, kind)
+        other = [what for what, value in kind.items() if first[1][what] != value]
         parts.append(part)
         periods_s += periods
-        other = [what for what, value in kind.items() if kinds[0][what] != value]
         if not is_same_rate(header.control_hz, parts[0].control_hz):
             other.append("steps a second")
         if other:
             raise DemosError(
-                f"{name} has other {other[0]} than {kinds[0]['name']}: learn from one kind at a "
-                "time."
+                f"{name} has other {other[0]} than {first[0]}: learn from one kind at a time."
             )
     if not parts:
         raise DemosError(f"There is no step of {' or '.join(sorted(drivers))} in {data}.")
@@ -212,7 +210,7 @@ def _part(
                 "steps with `shapechanger demos bad`."
             )
         periods_s = apart[np.diff(indices) == 1].tolist()
-    layout = Layout.from_json(header.state_layout) if header.state_layout else None
+    layout = header.states if header.state_layout else None
     part = Dataset(
         pictures=np.stack(pictures) if pictures else None,
         states=np.array([step.state for step in chosen], np.float32) if layout else None,
@@ -220,7 +218,7 @@ def _part(
         episodes=(len(chosen),),
         times_s=times_s,
         files=tuple(f"{name}, step {step.index}" for step in chosen),
-        action_layout=Layout.from_json(header.action_layout),
+        action_layout=header.actions,
         state_layout=layout,
         control_hz=header.control_hz,
         body=header.body,

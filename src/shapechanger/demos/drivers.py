@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import TaskDemonstrator, layouts_of
-from shapechanger.demos.cloning.clone import Clone
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.recording import ObservationEncoder, RecordEpisodes, name_of, row
 from shapechanger.errors import DemosError
@@ -31,18 +30,14 @@ Act = Callable[[Any], NDArray[np.float32]]
 """A policy: maps an observation to an action, shape (n,)."""
 
 # The expert takes over if a value of the two actions, such as the steering, has differed by more
-# than _APART for _APART_S seconds without interruption.
-_APART: Final = 0.6
-_APART_S: Final = 0.3
-# It takes over at once if an obstacle ahead would be reached within this time at the present speed,
-# s, and the policy does not brake.
+# than _APART for _APART_S without interruption; at once if an obstacle ahead would be reached
+# within _NEAR_S at the present speed, and the policy does not brake; and if the vehicle has stood
+# still for _STILL_S, because such steps would be useless. It hands back if no value has differed by
+# more than _AGREE for _AGREE_S without interruption, with no obstacle near.
+_APART, _APART_S = 0.6, 0.3
 _NEAR_S: Final = 0.4
-# It takes over if the vehicle has stood still for this long, s: such steps would be useless.
 _STILL_S: Final = 2.0
-# It hands back if no value has differed by more than _AGREE for _AGREE_S seconds without
-# interruption, with no obstacle near.
-_AGREE: Final = 0.3
-_AGREE_S: Final = 1.0
+_AGREE, _AGREE_S = 0.3, 1.0
 _ROUNDING: Final = 1e-9
 # Values of the actions of vehicles at which they are slowest.
 _RESTS: Final = {"throttle": 0.0, "waypoint/speed": -1.0}
@@ -177,55 +172,48 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
     Raises:
         DemosError: If the env has no expert, or the policy does not fit it.
     """
-    if corrected_by not in ("", EXPERT):
-        raise DemosError(f"A policy is corrected by {EXPERT}, and not by {corrected_by!r}.")
-    if driver == EXPERT and corrected_by:
-        raise DemosError("The expert needs no correction: give a policy as the driver.")
+    inner: Any = env.unwrapped
+    if corrected_by not in ("", EXPERT) or (corrected_by and driver == EXPERT):
+        raise DemosError(
+            f"Only a policy can be corrected by {EXPERT}, not {driver} by {corrected_by}."
+        )
     if driver != EXPERT and not Path(driver).is_file():
         raise DemosError(f"There is no driver {driver!r}: it is {EXPERT}, or the file of a policy.")
-    act = None if driver == EXPERT else _policy(Path(driver), env)
-    if act is not None and not corrected_by:
-        return Pilot(env, act, None)
-    inner: Any = env.unwrapped
-    if not hasattr(inner, "demonstrator"):
+    if EXPERT in (driver, corrected_by) and not hasattr(inner, "demonstrator"):
         raise DemosError(
             f"{name_of(env)} has no expert: let a policy drive with `--driver FILE`, or drive a "
             "robot yourself with `shapechanger robot drive`."
         )
-    return Pilot(env, act, inner.demonstrator(seed))
+    act = None if driver == EXPERT else _policy(Path(driver), env)
+    return Pilot(env, act, inner.demonstrator(seed) if act is None or corrected_by else None)
 
 
 def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     """Load a policy and check that its observations and actions fit the env."""
     box = cast("gym.spaces.Box", env.action_space)
 
-    def fitting(actions: NDArray[Any]) -> NDArray[np.float32]:
+    def fitting(actions: Any) -> NDArray[np.float32]:
         return np.clip(np.asarray(actions, np.float32)[0], box.low, box.high)
 
     policy = load_policy(path)
-    if policy.card.clone is not None:
-        acts = _clone(policy, path, env)
-        return lambda seen: fitting(acts(seen))
-    if (policy.card.observation, policy.card.action) != layouts_of(env):
-        raise DemosError(
-            f"{path} was trained in {policy.card.env}, whose observations or actions differ from "
-            f"{name_of(env)}."
-        )
-    return lambda seen: fitting(policy.act(np.asarray(seen)[np.newaxis]))
-
-
-def _clone(clone: Clone, path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
-    """Check that a clone fits the env's frames, state and actions."""
+    card, name = policy.card, name_of(env)
+    if card.clone is None:
+        if (card.observation, card.action) != layouts_of(env):
+            raise DemosError(
+                f"{path} was trained in {card.env}, whose observations or actions differ from "
+                f"{name}."
+            )
+        return lambda seen: fitting(policy.act(np.asarray(seen)[np.newaxis]))
     encoder = ObservationEncoder(env)
-    needs = {"image": clone.net.eyes != "none", "state": clone.card.observation is not None}
+    needs = {"image": card.clone.eyes != "none", "state": card.observation is not None}
     if needs["image"] and not encoder.has_picture:
-        raise DemosError(f"{path} drives by images, and {name_of(env)} shows none.")
-    clone.card.require_layouts(encoder.action_layout, encoder.state_layout)
+        raise DemosError(f"{path} drives by images, and {name} shows none.")
+    card.require_layouts(encoder.action_layout, encoder.state_layout)
 
-    def act(seen: Any) -> NDArray[Any]:
+    def act(seen: Any) -> NDArray[np.float32]:
         parts = encoder.parts(seen)
         image, state = (np.asarray(parts[n])[np.newaxis] if needs[n] else None for n in needs)
-        return clone.predict_many(image, state)
+        return fitting(policy.predict_many(image, state))
 
     return act
 

@@ -12,6 +12,7 @@ import json
 import math
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -29,10 +30,6 @@ from shapechanger.layout import Layout
 
 _PICTURE_DIMENSIONS: Final = 3
 _QUALITY: Final = 95  # JPEG quality of images that an env returns as arrays, percent.
-
-
-Numbers = tuple[float, ...]
-"""Values of an action or a state."""
 
 
 class ObservationEncoder:
@@ -61,11 +58,10 @@ class ObservationEncoder:
         parts: dict[str, Any] = {**self.parts(space), "action": cast("Any", env.action_space)}
         self.has_picture = "image" in parts
         self.state_layout = numbers if "state" in parts else None
-        sizes = {"state": numbers.size, "action": self.action_layout.size}
+        shapes = {"state": (numbers.size,), "action": (self.action_layout.size,)}
         for kind, part in parts.items():
             is_image = kind == "image" and part.dtype == np.uint8 and part.shape[2:] == (3,)
-            is_vector = kind in sizes and part.shape == (sizes[kind],)
-            if not isinstance(part, spaces.Box) or not (is_image or is_vector):
+            if not isinstance(part, spaces.Box) or not (is_image or part.shape == shapes.get(kind)):
                 raise DemosError(
                     f"The {kind} space of {name_of(env)} is {part}, which cannot be recorded: an "
                     "`image` is uint8, height x width x 3, and a `state` or an action is a vector "
@@ -76,15 +72,12 @@ class ObservationEncoder:
         """Return the `image` and the `state` of an observation."""
         return {self._alone: observation} if self._alone else observation
 
-    def encode(self, observation: Any, info: Mapping[str, Any]) -> tuple[bytes | None, Numbers]:
-        """Return the image and the state of an observation in the recorded form.
+    def encode(
+        self, observation: Any, info: Mapping[str, Any]
+    ) -> tuple[bytes | None, tuple[float, ...]]:
+        """Return the JPEG of an observation, None without images, and its state.
 
-        Args:
-            observation: Observation of the env.
-            info: The info that came with it.
-
-        Returns:
-            The JPEG, None without images; and the values, NaN for unmeasured ones.
+        Values of the state that `info["absent"]` names, because they were not measured, are NaN.
         """
         parts = self.parts(observation)
         jpeg: bytes | None = None
@@ -101,10 +94,6 @@ class ObservationEncoder:
 def name_of(env: gym.Env[Any, Any]) -> str:
     """Return the id of an env, or the name of its class."""
     return env.spec.id if env.spec else type(env.unwrapped).__name__
-
-
-_SECRET: Final = frozenset({"key"})
-"""Secret arguments of envs, which are left out of recordings."""
 
 
 class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]]):
@@ -152,8 +141,9 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         # Header of the episode, from a reset to the end; its writer, from the first step on.
         self._header: EpisodeHeader | None = None
         self._writer: EpisodeWriter | None = None
-        # For the next step: image, state and time of the observation; decision, if it was set.
-        self._seen: tuple[bytes | None, Numbers, int | None] = None, (), None
+        # For the next step: JPEG of the observation; its state and time; decision, if it was set.
+        self._jpeg: bytes | None = None
+        self._seen: dict[str, Any] = {}
         self._decision: Step | None = None
 
     def decide(self, decision: Step) -> None:
@@ -176,9 +166,34 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         """
         self.end()
         observation, info = super().reset(seed=seed, options=options)
-        self._seen = *self._encoder.encode(observation, info), info.get("captured_ns")
-        self._header = self._header_of(seed, options)
+        self._see(observation, info)
+        spec, inner, layout = self.env.spec, self.env.unwrapped, self._encoder.state_layout
+        kwargs = dict(spec.kwargs) if spec else {}
+        kwargs.pop("key", None)  # A secret.
+        robot = getattr(inner, "welcome", None)  # Only envs of robots on the network have it.
+        facts = ("robot", "body", "camera_pitch_deg", "camera_fovy_deg")
+        has_clock = self._seen["captured_ns"] is not None
+        fields: dict[str, Any] = {
+            **{name: getattr(robot, name) for name in facts if hasattr(robot, name)},
+            "action_layout": self._encoder.action_layout.to_json(),
+            "state_layout": layout.to_json() if layout else "",
+            "image_size": picture_size(self._jpeg, "from the env") if self._jpeg else None,
+            "control_hz": float(self.env.metadata.get("render_fps") or 20.0),
+            "env": spec.id if spec else "",
+            "env_kwargs": _plain(kwargs),
+            "driver": self._by_default,
+            "clock": getattr(inner, "record_clock", "none") if has_clock else "none",
+            "seed": seed,
+            **self._about,
+        }
+        if options:
+            fields["notes"] = {**fields.get("notes", {}), "reset_options": _plain(options)}
+        self._header = EpisodeHeader(**fields)
         return observation, info
+
+    def _see(self, observation: Any, info: Mapping[str, Any]) -> None:
+        self._jpeg, state = self._encoder.encode(observation, info)
+        self._seen = {"state": state, "captured_ns": info.get("captured_ns")}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Do a step, and record it.
@@ -190,33 +205,28 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         """
         if self._header is None:
             raise gym.error.ResetNeeded("Call reset() before the first step of an episode.")
-        jpeg, state, captured_ns = self._seen
         writer, self._writer = self._writer, None  # In case the next one cannot be created.
-        if writer is None or writer.is_full:  # Check the folder before the env moves.
-            writer = (
-                EpisodeWriter.create(self._recording, self._header)
-                if writer is None
-                else writer.continued()
-            )
-            self.path = writer.path
-            self.episodes += 1
-        self._writer = writer
+        if writer is None:  # Check the folder before the env moves.
+            writer = EpisodeWriter.create(self._recording, self._header)
+        elif writer.is_full:
+            writer = writer.continued()
+        self.episodes += writer.path != self.path
+        self._writer, self.path = writer, writer.path
         try:
             observation, reward, terminated, truncated, info = super().step(action)
         except BaseException as error:
             self.end("stopped" if isinstance(error, KeyboardInterrupt) else "failed")
             raise
-        over, terms = bool(terminated or truncated), cast("Any", info.get("reward_terms") or {})
         decided = self._decision or Step(action=row(action), driver=self._by_default)
         if (by_person := info.get("intervene_action")) is not None:
             decided = Step(action=row(by_person), driver="person", wanted=row(action))
         applied, self._decision = info.get("action_applied"), None
+        terms = cast("dict[str, Any]", info.get("reward_terms") or {})
         try:
             step = msgspec.structs.replace(
                 decided,
+                **self._seen,
                 applied=None if applied is None else row(applied),
-                state=state,
-                captured_ns=captured_ns,
                 decided_ns=info.get("decided_ns"),
                 wall_ns=time.time_ns(),
                 reward=float(reward),
@@ -225,14 +235,17 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
                 truncated=bool(truncated),
                 stop_reason=str(info.get("stop_reason", "")),
             )
-            writer.add(step, jpeg)
+            writer.add(step, self._jpeg)
             self.steps += 1
-            if over:
+            if terminated or truncated:
                 self.end(_outcome(step, info))
             else:
-                self._seen = *self._encoder.encode(observation, info), info.get("captured_ns")
+                self._see(observation, info)
         except ShapechangerError as error:
-            self._give_up(error, over=over)
+            if not (terminated or truncated):
+                self._stop(error)
+            with suppress(ShapechangerError):  # On a full disk; `demos repair` closes the episode.
+                self.end("failed")
             raise
         return observation, reward, terminated, truncated, info
 
@@ -267,46 +280,16 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         finally:
             self.end()
 
-    def _header_of(self, seed: int | None, options: Mapping[str, Any] | None) -> EpisodeHeader:
-        spec, inner, layout = self.env.spec, self.env.unwrapped, self._encoder.state_layout
-        jpeg, _, captured_ns = self._seen
-        kwargs = spec.kwargs if spec else {}
-        robot = getattr(inner, "welcome", None)  # Only envs of robots on the network have it.
-        facts = ("robot", "body", "camera_pitch_deg", "camera_fovy_deg")
-        fields: dict[str, Any] = {
-            **{name: getattr(robot, name) for name in facts if hasattr(robot, name)},
-            "action_layout": self._encoder.action_layout.to_json(),
-            "state_layout": layout.to_json() if layout else "",
-            "image_size": picture_size(jpeg, "from the env") if jpeg else None,
-            "control_hz": float(self.env.metadata.get("render_fps") or 20.0),
-            "env": spec.id if spec else "",
-            "env_kwargs": _plain({n: v for n, v in kwargs.items() if n not in _SECRET}),
-            "driver": self._by_default,
-            "clock": "none" if captured_ns is None else getattr(inner, "record_clock", "none"),
-            "seed": seed,
-            **self._about,
-        }
-        if options:
-            fields["notes"] = {**fields.get("notes", {}), "reset_options": _plain(options)}
-        return EpisodeHeader(**fields)
-
-    def _give_up(self, why: ShapechangerError, *, over: bool) -> None:
-        """Stop the env, and close the episode, even if either fails."""
-        # The action at rest: 0, or the bound nearest to 0.
+    def _stop(self, why: ShapechangerError) -> None:
+        """Do a step with the action at rest: 0, or the bound nearest to 0."""
         box = cast("gym.spaces.Box", self.env.action_space)
-        still = np.clip(np.zeros(box.shape), box.low, box.high).astype(np.float32)
         try:
-            if not over:
-                super().step(still)
+            super().step(np.clip(np.zeros(box.shape), box.low, box.high).astype(np.float32))
         except (ShapechangerError, gym.error.Error) as error:
             why.add_note(f"Stopping the env failed, too: {error}")
-        try:
-            self.end("failed")
-        except ShapechangerError as error:
-            why.add_note(str(error))
 
 
-def row(values: Any) -> Numbers:
+def row(values: Any) -> tuple[float, ...]:
     """Return the values of an array as a tuple."""
     return tuple(np.asarray(values, np.float64).ravel().tolist())
 

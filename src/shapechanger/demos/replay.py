@@ -15,9 +15,10 @@ from shapechanger.demos.episodes import Episode
 from shapechanger.demos.jpeg import BACKGROUND, decode_picture, overlay
 from shapechanger.demos.recording import ObservationEncoder
 from shapechanger.errors import DemosError
+from shapechanger.layout import Layout
 from shapechanger.reports.films import require_film, write_film
 
-_WITHOUT_CAMERA: Final = (40, 480, 3)
+_WITHOUT_CAMERA: Final = (40, 480, 3)  # Shape of an image.
 
 
 def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
@@ -53,53 +54,42 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
                 old, new = decode_picture(before, step.frame), decode_picture(jpeg, "of the env")
                 if old.shape == new.shape:
                     images.append(float(np.abs(old.astype(float) - new).mean()))
-            values = step.action if step.applied is None else step.applied
-            action = np.array(values, np.float32)
+            action = np.array(step.action if step.applied is None else step.applied, np.float32)
             observation, reward, terminated, truncated, info = env.step(action)
             over, played = bool(terminated or truncated), played + 1
             if step.reward is not None:
                 rewards.append((step.reward, float(reward)))
     ended = "; the episode ended there" if played < len(kept) else ""
-    differences = list(_differences(episode, images, np.array(states), rewards))
-    return [
-        f"played {played} of {len(kept)} steps in {ref}{ended}",
-        *_caveats(episode),
-        *(differences or ["nothing to compare"]),
-    ]
-
-
-def _caveats(episode: Episode) -> Iterator[str]:
-    """Yield reasons why a replay cannot be identical."""
-    kept = episode.kept
-    if episode.header.seed is None:
-        yield "it was recorded without a seed, so it starts elsewhere"
-    if kept[0].index != 0 or kept[-1].index - kept[0].index != len(kept) - 1:
-        yield "dropped steps were not played, so later steps start elsewhere"
+    said = [f"played {played} of {len(kept)} steps in {ref}{ended}"]
+    # Reasons why a replay cannot be identical.
+    if header.seed is None:
+        said.append("it was recorded without a seed, so it starts elsewhere")
+    if [step.index for step in kept] != list(range(len(kept))):
+        said.append("dropped steps were not played, so later steps start elsewhere")
     if any(step.applied is None for step in kept):
-        yield "applied actions are unknown, so the decided ones were played"
+        said.append("applied actions are unknown, so the decided ones were played")
+    differences = list(_differences(header.states, images, np.array(states), rewards))
+    return said + (differences or ["nothing to compare"])
 
 
 def _differences(
-    episode: Episode,
+    layout: Layout,
     images: list[float],
     states: NDArray[np.float64],
     rewards: list[tuple[float, float]],
 ) -> Iterator[str]:
     """Describe the differences of images, of 255; states, shape (n, size); and rewards."""
-    if images:
-        mean = f"images differ by {np.mean(images):.1f} of 255 on average"
-        same = "the images are the same in every step"
-        yield f"{mean}, {images[-1]:.1f} at the end" if any(images) else same
+    if any(images):
+        mean = np.mean(images)
+        yield f"images differ by {mean:.1f} of 255 on average, {images[-1]:.1f} at the end"
+    elif images:
+        yield "the images are the same in every step"
     if states.size and not np.nanmax(states, initial=0.0):
         yield "the state is the same in every step"
-    elif states.size:
-        layout = episode.header.states
-        for name, place in layout.slices.items():
-            if np.nanmax(gaps := states[:, place], initial=0.0):
-                yield (
-                    f"{layout[name]} differs by {np.nanmean(gaps):.3g} on average, "
-                    f"{np.nanmax(gaps):.3g} at most"
-                )
+    for name, place in layout.slices.items() if states.size else ():
+        if most := np.nanmax(gaps := states[:, place], initial=0.0):
+            mean = np.nanmean(gaps)
+            yield f"{layout[name]} differs by {mean:.3g} on average, {most:.3g} at most"
     if rewards:
         then, now = np.sum(rewards, axis=0)
         yield f"return {then:.2f} when recorded, {now:.2f} now"

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, Episode, Step
 from shapechanger.demos.jpeg import COLOURS, decode_picture
-from shapechanger.demos.statistics import gaps_s
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 from shapechanger.reports.page import jpeg_uri, render
@@ -61,8 +60,7 @@ def distributions(episodes: Sequence[Episode]) -> list[Distribution]:
     found: dict[tuple[str, str], tuple[Feature, list[float]]] = {}
 
     def add(feature: Feature, values: Iterable[float]) -> None:
-        _, numbers = found.setdefault((feature.name, feature.unit), (feature, []))
-        numbers.extend(values)
+        found.setdefault((feature.name, feature.unit), (feature, []))[1].extend(values)
 
     for one in episodes:
         layout = one.header.actions
@@ -74,13 +72,14 @@ def distributions(episodes: Sequence[Episode]) -> list[Distribution]:
             values = (value for step in one.kept for value in step.state[places[name]])
             add(Feature(name, layout[name].unit), values)
     for one in episodes:
-        add(Feature("time between steps", "ms"), (1e3 * gap for gap in gaps_s(one)))
-    pooled: list[Distribution] = []
-    for feature, values in found.values():
-        finite = np.array([value for value in values if math.isfinite(value)])
-        if len(finite):
-            pooled.append(Distribution(feature, finite, len(values) - len(finite)))
-    return pooled
+        add(Feature("time between steps", "ms"), (1e3 * gap for gap in one.gaps_s))
+    pooled = [(feature, np.array(values, np.float64)) for feature, values in found.values()]
+    finite = [(feature, values, np.isfinite(values)) for feature, values in pooled]
+    return [
+        Distribution(f, v[is_known], (~is_known).sum())
+        for f, v, is_known in finite
+        if any(is_known)
+    ]
 
 
 def recording_html(name: str, episodes: Sequence[Episode], broken: Sequence[str] = ()) -> str:
@@ -143,15 +142,18 @@ def _timeline(episode: Episode) -> dict[str, Any]:
     layout, first = episode.header.actions, episode.steps[0].index
     runs: list[tuple[int, int, str]] = []
     for who, run in groupby(episode.steps, lambda step: _who(episode, step)):
-        begin, *_, end = [step.index for step in run for _ in "be"]
-        runs.append((begin, end, who))
+        indexes = [step.index for step in run]
+        runs.append((indexes[0], indexes[-1], who))
     drawn = episode.steps[:: math.ceil(len(episode.steps) / _MAX_POINTS)]
+    bounds = np.abs([layout.low, layout.high])  # Unbounded values are drawn from -1 to 1.
+    bounds = np.where(np.isfinite(bounds), bounds, np.nan)
+    reaches = np.nan_to_num(np.fmax(*bounds), nan=1.0)
     traces: list[tuple[str, str, list[tuple[int, float]]]] = []
-    bounds = list(zip(layout.low.tolist(), layout.high.tolist(), strict=True))
     for place, (name, colour) in enumerate(zip(layout.names, _TRACE_COLOURS, strict=False)):
-        reach = _reach(*bounds[place]) or 1.0
-        values = (min(max(step.action[place] / reach, -1.0), 1.0) for step in drawn)
-        points = zip((step.index - first for step in drawn), values, strict=True)
+        values = np.clip(
+            [step.action[place] / (reaches[place] or 1.0) for step in drawn], -1.0, 1.0
+        )
+        points = zip((step.index - first for step in drawn), values.tolist(), strict=True)
         traces.append((name, colour, list(points)))
     return {
         "first": first,
@@ -159,17 +161,12 @@ def _timeline(episode: Episode) -> dict[str, Any]:
         "runs": runs,
         "names": layout.names,
         "traces": traces,
-        "reach": _reach(*(bound for pair in bounds for bound in pair)),
+        "reach": np.nanmax(bounds, initial=0.0) if np.isfinite(bounds).any() else 1.0,
     }
 
 
 def _who(episode: Episode, step: Step) -> str:
     return "dropped" if step.index in episode.excluded else step.driver
-
-
-def _reach(*bounds: float) -> float:
-    """Largest magnitude of the finite bounds; 1 without finite bounds."""
-    return max((abs(bound) for bound in bounds if math.isfinite(bound)), default=1.0)
 
 
 def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:

@@ -233,7 +233,7 @@ def test_a_policy_is_corrected(tmp_path: Path, demos: Cli) -> None:
         (["Ant"], "has no expert"),
         (["Car", "--minutes", "0"], "--minutes is more than 0"),
         (["Car", "--driver", "expret"], "no driver 'expret'"),
-        (["Car", "--corrected-by", "expert"], "needs no correction"),
+        (["Car", "--corrected-by", "expert"], "Only a policy can be corrected"),
         (["Car", "--corrected-by", "me"], "corrected by expert"),
         (["Car", "--options", '{"colour": 3}'], "colour"),
         (["Car", "--seed", "-1"], "A seed is"),

@@ -25,17 +25,16 @@ from shapechanger.demos.episodes import (
     edit,
     episode_at,
     episodes_of,
+    merge,
     read_episode,
     repair,
 )
 from shapechanger.demos.episodes.records import FRAMES, HEADER, STEPS
 from shapechanger.demos.exchange import export_recording, import_recording
 from shapechanger.demos.exchange.files import new_folder
-from shapechanger.demos.merging import merge
 from shapechanger.demos.report import distributions, recording_html
 from shapechanger.errors import DemosError, HubError
 from shapechanger.files import require_file, write_atomic
-from shapechanger.layout import Layout
 from shapechanger.reports.numbers import duration_text, shares_text
 
 _WIDEST: Final = 400
@@ -433,14 +432,15 @@ def _recording_card(episodes: list[Episode], hashes: dict[str, str], repo: str) 
     }
     shown = list(hashes.items())[:_MOST_HASHES]
     rows |= {f"SHA-256 of {name}": digest for name, digest in shown}
-    state = Layout.from_json(header.state_layout) if header.state_layout else None
-    action = Layout.from_json(header.action_layout)
     return readme(
         repo,
         ["demonstrations"],
         "Demonstrations, recorded with Shapechanger.",
         rows,
-        {"State": features_text(state, "none"), "Action": features_text(action)},
+        {
+            "State": features_text(header.states if header.state_layout else None, "none"),
+            "Action": features_text(header.actions),
+        },
         header.source,
         f"shapechanger demos pull {repo} --out data",
     )

@@ -1,12 +1,12 @@
-"""Read, repair and edit recorded episodes."""
+"""Read, repair, edit and merge recorded episodes."""
 
 from __future__ import annotations
 
-import functools
 import io
 import json
 import math
-import stat
+import os
+import shutil
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,6 @@ from shapechanger.demos.episodes.records import (
     DRIVERS,
     FRAMES,
     HEADER,
-    MAX_PICTURE_BYTES,
     MAX_TEXT_BYTES,
     STEPS,
     Driver,
@@ -33,7 +32,6 @@ from shapechanger.demos.episodes.records import (
     EpisodeMark,
     Keep,
     Step,
-    StepPicture,
     append,
     encode_line,
     free_path,
@@ -41,16 +39,12 @@ from shapechanger.demos.episodes.records import (
     lock,
     longest_period_s,
     parse_line,
+    write_header,
 )
-from shapechanger.demos.episodes.writer import write_header
-from shapechanger.errors import BrokenEpisode, DemosError, UnknownName
+from shapechanger.errors import BrokenEpisode, DemosError, OutputError, UnknownName
 from shapechanger.files import read_file, write_atomic, writing
 
-_LOST: Final = "lost"
-"""Folder of an episode for lines and images that `repair` moves aside."""
-
-_CUT_OFF: Final = "cut off"
-"""Outcome of an episode that was not closed before `repair`."""
+_LOST: Final = "lost"  # Folder of an episode for lines and images that `repair` moves aside.
 
 
 @dataclass(frozen=True)
@@ -79,17 +73,13 @@ class Episode:
     @cached_property
     def excluded(self) -> dict[int, str]:
         """Why each excluded step is excluded, keyed by its index."""
-        found: dict[int, str] = {}
+        why: dict[int, str | None] = {}
         indexes = [step.index for step in self.steps]
         for drop in self.drops:
             # A line may name a range far beyond the steps that exist.
             reach = indexes[bisect_left(indexes, drop.first) : bisect_right(indexes, drop.last)]
-            for index in reach:
-                if isinstance(drop, Keep):
-                    found.pop(index, None)
-                else:
-                    found[index] = drop.why
-        return found
+            why |= dict.fromkeys(reach, None if isinstance(drop, Keep) else drop.why)
+        return {index: text for index, text in why.items() if text is not None}
 
     @cached_property
     def kept(self) -> tuple[Step, ...]:
@@ -102,12 +92,19 @@ class Episode:
 
         A step lasts one period if it is the last one, if a pause follows, or if a time is unknown.
         """
-        hz, found = self.header.control_hz, list[float]()
-        for one, two in pairwise(self.steps):
-            now, later = one.clock_ns, two.clock_ns
-            passed_s = -1.0 if now is None or later is None else (later - now) / 1e9
-            found.append(passed_s if 0.0 <= passed_s <= longest_period_s(hz) else 1.0 / hz)
-        return (*found, 1.0 / hz) if self.steps else ()
+        hz = self.header.control_hz
+        passed = (_passed_s(one, two) for one, two in pairwise(self.steps))
+        lasted = (s if 0.0 <= s <= longest_period_s(hz) else 1.0 / hz for s in passed)
+        return (*lasted, 1.0 / hz) if self.steps else ()
+
+    @property
+    def gaps_s(self) -> list[float]:
+        """Times between consecutive kept steps on the robot's clock, s.
+
+        Steps without a time, and pairs with dropped steps in between, are left out.
+        """
+        pairs = ((one, two) for one, two in pairwise(self.kept) if two.index == one.index + 1)
+        return [gap for one, two in pairs if not math.isnan(gap := _passed_s(one, two))]
 
     @property
     def seconds(self) -> float:
@@ -142,12 +139,15 @@ class Episode:
         if step.picture is None:
             return None
         try:
-            data = read_file(self.path / FRAMES / step.frame, MAX_PICTURE_BYTES)
-        except OSError as error:
-            raise _broken(self.path, f"the image {step.frame} cannot be read") from error
-        if not step.picture.fits(data):
-            raise _broken(self.path, f"the image {step.frame} was changed")
-        return data
+            return step.picture.read(self.path / FRAMES)
+        except ValueError as error:
+            raise _broken(self.path, f"{error}, at step {step.index}") from error
+
+
+def _passed_s(one: Step, two: Step) -> float:
+    """Return the time from one step to the next, s; NaN if a time is unknown."""
+    now, later = one.clock_ns, two.clock_ns
+    return math.nan if now is None or later is None else (later - now) / 1e9
 
 
 def _broken(path: Path, why: str) -> BrokenEpisode:
@@ -165,9 +165,9 @@ def read_episode(path: Path) -> Episode:
     """
     header, outcome = read_header(path)
     lines: list[Step | Edit | None] = []
-    for _, line, wrong in _checked_lines(path, header):
+    for number, (_, line, wrong) in enumerate(_checked_lines(path, header), 1):
         if wrong:
-            raise _broken(path, f"line {len(lines) + 1} is invalid, because {wrong}")
+            raise _broken(path, f"line {number} is invalid, because {wrong}")
         lines.append(line)
     return _episode(path, header, outcome, lines)
 
@@ -248,34 +248,22 @@ def _checked_lines(
     except OSError as error:
         raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
     sizes = header.actions.size, header.states.size
-    fault_of = functools.cache(functools.partial(_image_fault, path / FRAMES, thorough=thorough))
-    newest = -1
+    newest, sound = -1, None  # Index of the newest step, and the newest image that is sound.
     for raw in io.BytesIO(content):
         line, wrong = None, ""
         try:
             line = parse_line(raw)
+            if isinstance(line, Step):
+                wrong = line.refusal(*sizes)
+                if not wrong and line.index <= newest:
+                    wrong = f"it comes after step {newest}"
+                newest = max(newest, line.index)
+                if not wrong and line.picture and line.picture != sound:
+                    line.picture.read(path / FRAMES, checksum=thorough)
+                    sound = line.picture
         except ValueError as error:
             wrong = str(error)
-        if isinstance(line, Step):
-            disorder = f"it comes after step {newest}" if line.index <= newest else ""
-            wrong = line.refusal(*sizes) or disorder or fault_of(line.picture)
-            newest = max(newest, line.index)
         yield raw, line, wrong
-
-
-def _image_fault(frames: Path, picture: StepPicture | None, *, thorough: bool) -> str:
-    """Return the fault of a step's image, as part of a sentence; "" if the image is valid."""
-    if picture is None:
-        return ""
-    path = frames / picture.name
-    try:
-        found = path.stat()
-        is_same = stat.S_ISREG(found.st_mode) and found.st_size == picture.size
-        if is_same and thorough:
-            is_same = picture.fits(read_file(path, MAX_PICTURE_BYTES))
-    except OSError as error:
-        return f"its image {picture.name} cannot be read ({error.strerror})"
-    return "" if is_same else f"its image {picture.name} was changed"
 
 
 def episodes_of(data: Path) -> tuple[Path, ...]:
@@ -351,7 +339,7 @@ def repair(path: Path) -> str:
         if strays:
             done.append(f"moved aside unused images: {len(strays)}")
         if outcome is None:
-            write_header(path, header, {"steps": len(kept), "outcome": _CUT_OFF})
+            write_header(path, header, {"steps": len(kept), "outcome": "cut off"})
             done.append("closed it")
     return (
         ", ".join([f"kept {len(kept)} steps", *done])
@@ -382,3 +370,61 @@ def edit(path: Path, line: Edit) -> None:
             raise DemosError(f"{path} has the steps {least} to {most}, and not {first} to {last}.")
         with writing(path / STEPS):
             append(file, encode_line(line))
+
+
+def merge(sources: Sequence[Path], out: Path) -> list[tuple[Path, Path]]:
+    """Copy episodes into one recording; the sources are not changed, and nothing is overwritten.
+
+    All episodes are read before the first one is copied. A taken name gets the next free number.
+
+    Args:
+        sources: Recordings, or single episodes.
+        out: Folder of the target recording; created if missing.
+
+    Returns:
+        Source and target folder of each episode.
+
+    Raises:
+        DemosError: If there are no episodes, or one is still being recorded, already in `out`, or
+            has links.
+        BrokenEpisode: If an episode is damaged.
+        OutputError: If an episode cannot be copied; those copied before are complete.
+    """
+    if not sources:
+        raise DemosError("There is nothing to merge: give at least one recording.")
+    if is_episode(out):
+        raise DemosError(f"{out} is an episode, but a recording is a folder of episodes.")
+    episodes = [read_episode(path) for source in sources for path in episodes_of(source)]
+    is_new = not out.exists() or (out.is_dir() and not any(out.iterdir()))
+    there = [] if is_new else [read_episode(path) for path in episodes_of(out)]
+    known = {_identity(episode): episode.path for episode in there}
+    for episode in episodes:
+        if not episode.closed:
+            raise DemosError(f"{episode.path} is still recorded, or needs `demos repair`.")
+        if (same := known.setdefault(_identity(episode), episode.path)) is not episode.path:
+            raise DemosError(f"{episode.path} and {same} are the same episode.")
+        # A link would copy a file or a folder of another place into the recording.
+        if link := next((path for path in episode.path.rglob("*") if path.is_symlink()), None):
+            raise DemosError(f"{link} is a link, but an episode has only files: remove it.")
+    return [(episode.path, _copied(episode.path, out)) for episode in episodes]
+
+
+def _identity(episode: Episode) -> tuple[object, ...]:
+    """Return fields that identify an episode, and that marks and drops do not change."""
+    first = episode.steps[0] if episode.steps else None
+    seen = (first.wall_ns, first.captured_ns, first.picture, first.action) if first else ()
+    return (episode.header.created, len(episode.steps), *seen)
+
+
+def _copied(source: Path, out: Path) -> Path:
+    """Copy an episode atomically."""
+    part, target = out / f".{source.name}.{os.getpid()}.part", free_path(out, source.name)
+    try:
+        with writing(target):
+            out.mkdir(parents=True, exist_ok=True)
+            shutil.copytree(source, part)
+            part.rename(target)
+    except OutputError:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+    return target

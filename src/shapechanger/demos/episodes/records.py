@@ -9,16 +9,18 @@ import json
 import math
 import os
 import re
+import stat
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, cast
 
 import msgspec
+import numpy as np
 from msgspec import Meta
 
-from shapechanger.errors import DemosError, OutputError, translate_errors
-from shapechanger.files import writing
+from shapechanger.errors import DemosError, OutputError
+from shapechanger.files import read_file, write_atomic, writing
 from shapechanger.layout import Layout
 
 HEADER: Final = "episode.json"
@@ -53,34 +55,24 @@ def free_path(folder: Path, stem: str, ending: str = "") -> Path:
 
 
 def lock(path: Path, busy: str) -> io.FileIO:
-    """Open a file for appending, and lock it until it is closed; create the file if it is missing.
-
-    Args:
-        path: The file.
-        busy: Error message if another process holds the lock.
+    """Open a file for appending, created if missing, and lock it until it is closed.
 
     Raises:
-        DemosError: If another process holds the lock.
+        DemosError: With the message `busy`, if another process holds the lock.
         OutputError: If the file cannot be opened for writing.
     """
     with writing(path):
         file = io.FileIO(path, "a+")  # Opening a pipe only for writing would block.
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
+        except BlockingIOError:
             file.close()
-            if isinstance(error, BlockingIOError):
-                raise DemosError(busy) from None
-            raise
+            raise DemosError(busy) from None
     return file
 
 
 def append(file: io.FileIO, data: bytes) -> None:
-    """Append to a file completely, or leave the file as it was.
-
-    Raises:
-        OSError: If the data cannot be written.
-    """
+    """Append to a file completely, or raise OSError and leave the file as it was."""
     before, written = os.fstat(file.fileno()).st_size, 0
     try:
         while written < len(data):
@@ -90,8 +82,7 @@ def append(file: io.FileIO, data: bytes) -> None:
         raise
 
 
-_FORMAT: Final = 1
-"""Version of the format. Readers refuse any other version."""
+_FORMAT: Final = 1  # Readers refuse any other version.
 
 Clock = Literal["real", "twin", "none"]
 """Source of the nanoseconds in steps: a robot's clock, the stepped clock of a twin, or none."""
@@ -169,10 +160,8 @@ class EpisodeHeader:
 
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON can hold it, with the layouts expanded for readability."""
-        plain = asdict(self)
-        for name in ("action_layout", "state_layout"):
-            plain[name] = json.loads(plain[name]) if plain[name] else None
-        return plain
+        layouts = {"action_layout": self.action_layout, "state_layout": self.state_layout or "null"}
+        return asdict(self) | {name: json.loads(text) for name, text in layouts.items()}
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> EpisodeHeader:
@@ -186,15 +175,15 @@ class EpisodeHeader:
                 f"The episode has format {plain.get('format')}, but this version of Shapechanger "
                 f"reads format {_FORMAT} only."
             )
-        known = dict(plain)
-        for name in {"action_layout", "state_layout"} & known.keys():
-            layout = known[name] or ""  # Same form as from `Layout.to_json`; null is "".
-            known[name] = layout and json.dumps(layout, separators=(",", ":"), ensure_ascii=False)
-        with translate_errors(
-            msgspec.ValidationError,
-            to=lambda error: DemosError(f"The header is invalid ({error})."),
-        ):
-            return msgspec.convert(known, cls)
+        layouts = {
+            name: json.dumps(plain[name], separators=(",", ":"), ensure_ascii=False)
+            for name in ("action_layout", "state_layout")
+            if plain.get(name)
+        }
+        try:
+            return msgspec.convert(plain | {"state_layout": ""} | layouts, cls)
+        except msgspec.ValidationError as error:
+            raise DemosError(f"The header is invalid ({error}).") from error
 
 
 Driver = Literal["person", "policy", "expert", "program"]
@@ -221,6 +210,23 @@ class StepPicture(msgspec.Struct, frozen=True, array_like=True):
     def fits(self, jpeg: bytes) -> bool:
         """Return whether an image is the recorded one."""
         return self == StepPicture.of(self.name, jpeg)
+
+    def read(self, frames: Path, *, checksum: bool = True) -> bytes:
+        """Read the image, or only its size without `checksum`.
+
+        Raises:
+            ValueError: If the image is missing or was changed; the message is part of a sentence.
+        """
+        try:
+            found, jpeg = (frames / self.name).stat(), b""
+            is_same = stat.S_ISREG(found.st_mode) and found.st_size == self.size
+            if is_same and checksum:
+                jpeg = read_file(frames / self.name, MAX_PICTURE_BYTES)
+        except OSError as error:
+            raise ValueError(f"its image {self.name} cannot be read ({error.strerror})") from error
+        if not is_same or (checksum and not self.fits(jpeg)):
+            raise ValueError(f"its image {self.name} was changed")
+        return jpeg
 
 
 class Step(
@@ -284,9 +290,18 @@ class Step(
         return "" if is_finite else f"its action is {list(self.action)}"
 
     def to_json(self) -> dict[str, Any]:
-        """Return the step as JSON can hold it; empty fields are left out."""
-        plain = msgspec.to_builtins(self, enc_hook=float).items()  # Converts NumPy numbers, too.
-        return {name: _mapped(_as_json, value) for name, value in plain}
+        """Return the step as JSON can hold it; empty fields are left out.
+
+        NaN becomes null, and an infinity a string.
+        """
+
+        def change(value: Any) -> Any:
+            if not isinstance(value, float) or math.isfinite(value):
+                return value
+            return None if math.isnan(value) else str(value)
+
+        # The hook converts NumPy numbers.
+        return _mapped(change, msgspec.to_builtins(self, enc_hook=float))
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> Step:
@@ -295,33 +310,30 @@ class Step(
         Raises:
             ValueError: If a field is missing or invalid.
         """
-        known = {name: _mapped(_from_json, value) for name, value in plain.items()}
-        try:
-            return msgspec.convert(known, cls, strict=False)
-        except msgspec.ValidationError as error:
-            raise ValueError(f"it is not a valid step ({error})") from error
+        known = _mapped(lambda value: math.nan if value is None else value, plain)
+        return _converted(known, cls, strict=False)
 
 
-def _mapped(change: Callable[[Any], Any], value: Any) -> Any:
-    """Change a value, or each one of a list or a dictionary."""
-    match value:
-        case dict():
-            return {name: change(one) for name, one in cast("dict[str, Any]", value).items()}
-        case list() | tuple():
-            return [change(one) for one in cast("Sequence[Any]", value)]
-        case _:
-            return change(value)
+def _mapped(change: Callable[[Any], Any], fields: dict[str, Any]) -> dict[str, Any]:
+    """Change each value, and each one of the lists and dictionaries among them."""
+    changed: dict[str, Any] = {}
+    for name, value in fields.items():
+        match value:
+            case dict():
+                items = cast("dict[str, Any]", value).items()
+                changed[name] = {key: change(one) for key, one in items}
+            case list() | tuple():
+                changed[name] = [change(one) for one in cast("Sequence[Any]", value)]
+            case _:
+                changed[name] = change(value)
+    return changed
 
 
-def _as_json(value: Any) -> Any:
-    """Return a number as JSON can hold it: null for NaN, a string for an infinity."""
-    if not isinstance(value, float) or math.isfinite(value):
-        return value
-    return None if math.isnan(value) else str(value)
-
-
-def _from_json(value: Any) -> Any:
-    return math.nan if value is None else value
+def _converted(fields: Any, kind: Any, *, strict: bool = True) -> Any:
+    try:
+        return msgspec.convert(fields, kind, strict=strict)
+    except msgspec.ValidationError as error:
+        raise ValueError(f"it is invalid ({error})") from error
 
 
 class EpisodeMark(msgspec.Struct, frozen=True, tag_field="kind", tag="mark"):
@@ -354,6 +366,9 @@ Edit = EpisodeMark | Drop | Keep
 
 _PAUSE_PERIODS: Final = 30.0
 _SHORTEST_PAUSE_S: Final = 1.0  # A slow disk or an imprecise rate causes shorter gaps.
+_SAME_RATE: Final = 0.01  # Two recorders at 20 Hz may write 20 and 20.000001.
+_MOST_JITTER: Final = 0.25  # Two settings of a rate differ by at least a third.
+_MIN_PERIODS: Final = 20
 
 
 def longest_period_s(control_hz: float) -> float:
@@ -361,9 +376,25 @@ def longest_period_s(control_hz: float) -> float:
     return max(_PAUSE_PERIODS / control_hz, _SHORTEST_PAUSE_S)
 
 
-_MAX_LINE: Final = 1 << 20
-"""Length limit of a line in bytes; longer lines are treated as damaged."""
+def rate_jitter(periods_s: Sequence[float], control_hz: float) -> float:
+    """Return how far the rate of a recording of so many steps per second varied, as a share of it.
 
+    It is the larger deviation of the 5th and the 95th percentile of the times between steps, s; at
+    most 0.25, and 0 for fewer than 20 times.
+    """
+    if len(periods_s) < _MIN_PERIODS:
+        return 0.0
+    low, high = np.percentile(periods_s, (5.0, 95.0)) * control_hz
+    return float(min(max(1.0 - low, high - 1.0, 0.0), _MOST_JITTER))
+
+
+def is_same_rate(recorded_hz: float, control_hz: float, jitter: float = 0.0) -> bool:
+    """Return whether a robot has the rate of a recording, within 1 % or its `rate_jitter`."""
+    allowed = max(_SAME_RATE, min(jitter, _MOST_JITTER))
+    return abs(recorded_hz / control_hz - 1.0) <= allowed
+
+
+_MAX_LINE: Final = 1 << 20  # Bytes; longer lines are treated as damaged.
 _CHECK: Final = b',"crc":"%08x"}\n'
 _CHECK_SIZE: Final = len(_CHECK % 0)
 
@@ -389,17 +420,20 @@ def parse_line(line: bytes) -> Step | Edit | None:
     if not body or check != _CHECK % binascii.crc32(body):
         raise ValueError("it is cut off or was changed")
     try:
-        fields = json.loads(body + b"}")
-        match fields:
-            case {"kind": "step"}:
+        match json.loads(body + b"}"):
+            case {"kind": "step"} as fields:
                 return Step.from_json(cast("dict[str, Any]", fields))
-            case {"kind": "mark" | "drop" | "keep"}:
-                return msgspec.convert(fields, Edit)
+            case {"kind": "mark" | "drop" | "keep"} as fields:
+                return _converted(fields, Edit)
             case dict():
                 return None
             case _:
                 raise ValueError("it is not a JSON object")
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
-    except msgspec.ValidationError as error:
-        raise ValueError(f"it is not a valid mark or edit ({error})") from error
+
+
+def write_header(folder: Path, header: EpisodeHeader, closed: dict[str, Any] | None) -> None:
+    """Write the header of an episode atomically, with how it was closed."""
+    text = json.dumps(header.to_json() | {"closed": closed}, indent=1, ensure_ascii=False)
+    write_atomic(folder / HEADER, f"{text}\n".encode())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import math
 import os
 import shutil
@@ -15,13 +14,12 @@ from importlib.metadata import version
 from itertools import takewhile
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, Final, Self
+from typing import Final, Self
 
 import msgspec
 
 from shapechanger.demos.episodes.records import (
     FRAMES,
-    HEADER,
     MAX_TEXT_BYTES,
     STEPS,
     Drop,
@@ -34,9 +32,10 @@ from shapechanger.demos.episodes.records import (
     free_path,
     lock,
     parse_line,
+    write_header,
 )
 from shapechanger.errors import DemosError, OutputError
-from shapechanger.files import write_atomic, writing
+from shapechanger.files import writing
 
 SPARE_BYTES: Final = 64 << 20
 """Disk space to leave free by default."""
@@ -44,9 +43,6 @@ SPARE_BYTES: Final = 64 << 20
 FULL_BYTES: Final = MAX_TEXT_BYTES * 3 // 4
 """Size of `steps.jsonl` from which recorders begin the next episode, bytes; the rest of the limit
 is for marks and edits that are added later."""
-
-_CONTINUED: Final = "continued"
-"""Outcome of an episode that was full, and goes on in the next one."""
 
 _LOCK: Final = ".recording"
 _JPEG: Final = b"\xff\xd8"
@@ -158,7 +154,7 @@ class EpisodeWriter:
         Raises:
             OutputError: If the next one cannot be created; this one is closed then.
         """
-        self.close(_CONTINUED)
+        self.close("continued")
         # The next episode does not begin with a reset of the env.
         notes = self._header.notes | {"continues": self.path.name}
         header = replace(self._header, seed=None, notes=notes)
@@ -190,17 +186,20 @@ class EpisodeWriter:
         if self.steps % _SPACE_CHECK_STEPS == 0:
             _require_space(self.path, self._spare_bytes)
         before, jpeg = self._before, self._jpeg if jpeg is None else jpeg
-        picture = before.picture if before is not None else None
-        is_new = jpeg is not None and (before is None or jpeg != self._jpeg)
-        if jpeg is not None and is_new:
-            picture = StepPicture.of(f"{self.steps:06d}.jpg", jpeg)
+        picture, is_new = before and before.picture, False
+        if jpeg is not None and (before is None or jpeg != self._jpeg):
+            picture, is_new = StepPicture.of(f"{self.steps:06d}.jpg", jpeg), True
         step = msgspec.structs.replace(step, index=self.steps, picture=picture)
         line = encode_line(step)
         try:
             parse_line(line)  # Readers refuse an invalid one.
-            refusal = step.refusal(*self._sizes) or _disorder(before, step)
+            refusal = step.refusal(*self._sizes)
         except ValueError as error:
             refusal = str(error)
+        for name in ("captured_ns", "decided_ns"):
+            earlier, later = getattr(before, name, None), getattr(step, name)
+            if earlier is not None and later is not None and later < earlier:
+                refusal = f"time runs backwards, from {earlier} to {later} ns ({name})"
         if jpeg is not None and not jpeg.startswith(_JPEG):
             refusal = "its image is not a JPEG"
         if refusal:
@@ -212,7 +211,10 @@ class EpisodeWriter:
             self._unsynced.put(path)
         self._append(line)
         self._before, self._jpeg = step, jpeg
-        self._times.append((step.index, self._time_ns(step)))
+        at_ns = step.clock_ns
+        if at_ns is None:
+            at_ns = round(step.index * _NS_PER_S / self._header.control_hz)
+        self._times.append((step.index, at_ns))
         self.steps += 1
         return step.index
 
@@ -290,28 +292,9 @@ class EpisodeWriter:
             with suppress(OSError):
                 os.fsync(self._file.fileno())
 
-    def _time_ns(self, step: Step) -> int:
-        at_ns = step.clock_ns
-        return round(step.index * _NS_PER_S / self._header.control_hz) if at_ns is None else at_ns
-
     def _require_open(self) -> None:
         if self._closed.is_set():
             raise DemosError(f"The episode {self.path} is closed.")
-
-
-def _disorder(before: Step | None, step: Step) -> str:
-    """Return the time that runs backwards, as part of a sentence; "" if the times ascend."""
-    for name in ("captured_ns", "decided_ns"):
-        earlier, later = getattr(before, name, None), getattr(step, name)
-        if earlier is not None and later is not None and later < earlier:
-            return f"time runs backwards, from {earlier} to {later} ns ({name})"
-    return ""
-
-
-def write_header(folder: Path, header: EpisodeHeader, closed: dict[str, Any] | None) -> None:
-    """Write the header of an episode atomically, with how it was closed."""
-    text = json.dumps(header.to_json() | {"closed": closed}, indent=1, ensure_ascii=False)
-    write_atomic(folder / HEADER, f"{text}\n".encode())
 
 
 def _require_space(folder: Path, spare_bytes: int) -> None:

@@ -20,10 +20,11 @@ from shapechanger.demos.episodes.records import (
     Step,
     append,
     is_episode,
+    is_same_rate,
     lock,
     parse_line,
+    rate_jitter,
 )
-from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from shapechanger.errors import (
     DemosError,
     LinkError,
@@ -212,7 +213,7 @@ def _give_back(robot: RobotClient) -> None:
 
 def _require_fit(episode: Episode, welcome: Welcome) -> None:
     """Refuse a robot that does not fit the recording."""
-    recorded = Layout.from_json(episode.header.action_layout)
+    recorded = episode.header.actions
     moved = Layout.from_json(welcome.action_layout)
     ranges = [
         [(f.name, f.unit, f.shape, f.low, f.high) for f in layout] for layout in (recorded, moved)
@@ -223,7 +224,7 @@ def _require_fit(episode: Episode, welcome: Welcome) -> None:
             f"{_told(recorded)}."
         )
     rate, own = episode.header.control_hz, welcome.control_hz
-    if not is_same_rate(rate, own, rate_jitter(gaps_s(episode), rate)):
+    if not is_same_rate(rate, own, rate_jitter(episode.gaps_s, rate)):
         raise DemosError(
             f"{welcome.robot} takes {own:g} commands a second, and {episode.path.name} has "
             f"{rate:g} steps a second."

@@ -19,7 +19,7 @@ from typing import Any, Final, Self
 import numpy as np
 
 from shapechanger.demos.cloning.clone import Clone, load_clone
-from shapechanger.demos.statistics import is_same_rate
+from shapechanger.demos.episodes.records import is_same_rate
 from shapechanger.errors import PolicyError, RobotRefused, ShapechangerError, no_policy_file
 from shapechanger.layout import Layout
 from shapechanger.policy import PolicyCard
