@@ -29,17 +29,17 @@ AWAY = np.array([-1.0, 0.5], np.float32)
 RIGHT = np.array([0.0, 0.5], np.float32)  # What the expert of the corridor intends.
 
 
-def recorded(folder: Path, act: Act | None, expert: AlwaysForward | None) -> list[Episode]:
-    """Record 25 steps in the corridor, whose episodes have at most 40."""
+def recorded(
+    folder: Path, act: Act | None, expert: AlwaysForward | None, steps: int = 25
+) -> list[Episode]:
+    """Record in the corridor, whose episodes have at most 40 steps."""
     with RecordEpisodes(CorridorEnv("state"), folder) as env:
-        record_steps(env, Pilot(env, act, expert), 25, seed=5)
+        record_steps(env, Pilot(env, act, expert), steps, seed=5)
     return [read_episode(path) for path in episodes_of(folder)]
 
 
 def test_an_expert_is_recorded_with_its_intention(tmp_path: Path) -> None:
-    with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
-        record_steps(env, Pilot(env, None, AlwaysForward()), 50, seed=5)
-    episodes = [read_episode(path) for path in episodes_of(tmp_path)]
+    episodes = recorded(tmp_path, None, AlwaysForward(), 50)
     assert sum(len(episode.steps) for episode in episodes) == 50
     assert [episode.header.seed for episode in episodes] == [5, 6]
     first = episodes[0].steps[0]
@@ -57,13 +57,7 @@ def test_only_corrections_are_learned_from(tmp_path: Path) -> None:
     assert (after.action, after.wanted, after.applied) == ((0.0, 0.5), (-1.0, 0.5), (0.0, 0.25))
     assert [mark.step for mark in episode.marks] == [2]
     assert len(load_dataset(tmp_path)) == 23
-
-
-def test_policy_steps_are_not_loaded_by_default(tmp_path: Path) -> None:
-    recorded(tmp_path, lambda seen: AWAY, None)
-    assert len(load_dataset(tmp_path, drivers=("policy",))) == 25
-    with pytest.raises(ValueError, match="no step of expert or person"):
-        load_dataset(tmp_path)
+    assert len(load_dataset(tmp_path, drivers=("policy",))) == 2
 
 
 class Corrected:
@@ -83,8 +77,8 @@ class Corrected:
     def decide(self, wanted: Any, *, danger: bool = False) -> tuple[str, str]:
         """Return who drives, and the remark."""
         self.world.touches = danger
-        decision = self.pilot.decide(np.array(wanted, np.float32))
-        return decision.decided.driver[0], decision.remark
+        _, decided, remark = self.pilot.decide(np.array(wanted, np.float32))
+        return decided.driver[0], remark
 
 
 @pytest.mark.parametrize(
@@ -144,10 +138,10 @@ def test_a_policy_gets_its_part_of_the_observation(
     env = CorridorEnv(shows)
     pilot = pilot_of(env, clone(tmp_path / "policy.safetensors"), corrected_by, 0)
     pilot.begin()
-    decision = pilot.decide(env.reset(seed=0)[0])
-    assert decision.decided.driver == "policy"
-    assert env.action_space.contains(decision.carried_out)
-    assert decision.decided.action == tuple(decision.carried_out.tolist())
+    action, decided, _ = pilot.decide(env.reset(seed=0)[0])
+    assert decided.driver == "policy"
+    assert env.action_space.contains(action)
+    assert decided.action == tuple(action.tolist())
 
 
 @pytest.mark.parametrize(
@@ -163,9 +157,9 @@ def test_danger_and_standing_are_corrected_and_slowness_is_not(
         env.reset(options={"course": 3, "start": 3})
         pilot.begin()
         for _ in range(steps):
-            decision = pilot.decide(None)
-            env.step(decision.carried_out)
-            remarks.add(decision.remark)
+            action, _, remark = pilot.decide(None)
+            env.step(action)
+            remarks.add(remark)
         progress_m = env.world.progress_m
     share = pilot.corrected / pilot.steps
     if factors == (1.0, 0.3):

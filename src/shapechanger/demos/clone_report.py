@@ -64,7 +64,7 @@ def write_report(
             if not by_class
         ],
         frames=_worst(policy, data, evaluation),
-        training_chart="" if training is None else training_chart(training),
+        training_chart=training_chart(training) if training else "",
         card=policy.card,
         **numbers,
     )
@@ -76,8 +76,8 @@ def write_report(
 def _worst(policy: Clone, data: Dataset, evaluation: EvaluationResult) -> list[dict[str, Any]]:
     """The steps with the largest errors: what the driver did, and what the policy did."""
     chosen = list(evaluation.worst)
-    pictures = None if data.pictures is None else data.pictures[chosen]
-    states = None if data.states is None else data.states[chosen]
+    arrays = (data.pictures, data.states)
+    pictures, states = (None if seen is None else seen[chosen] for seen in arrays)
     outputs, actions = policy.outputs(pictures, states), policy.predict_many(pictures, states)
     frames: list[dict[str, Any]] = []
     for i, step in enumerate(chosen):
@@ -89,11 +89,9 @@ def _worst(policy: Clone, data: Dataset, evaluation: EvaluationResult) -> list[d
             driver, did = (", ".join(f"{value:.2f}" for value in action) for action in both)
         source = ""
         if pictures is not None:
-            large = pictures[i].repeat(_MAGNIFICATION, axis=0).repeat(_MAGNIFICATION, axis=1)
-            source = png_uri(large)
+            source = png_uri(pictures[i].repeat(_MAGNIFICATION, 0).repeat(_MAGNIFICATION, 1))
         # The last folder identifies the recording; a whole path would hide the rest.
-        file = data.files[step].split("/")[-1]
-        caption = f"{file}: the driver did {driver}, the policy {did}"
+        caption = f"{data.files[step].split('/')[-1]}: the driver did {driver}, the policy {did}"
         frames.append({"source": source, "caption": caption})
     return frames
 

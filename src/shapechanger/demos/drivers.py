@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
@@ -44,19 +44,9 @@ _RESTS: Final = {"throttle": 0.0, "waypoint/speed": -1.0}
 _CRAWLS_MPS: Final = 0.05  # Below this speed a vehicle does not collide.
 
 
-class DriverDecision(NamedTuple):
-    """The decision for one step.
-
-    Attributes:
-        carried_out: Action to pass to the env, shape (n,).
-        decided: Step with the action to record as decided, which differs if a demonstrator errs on
-            purpose; its driver; and the action of a policy while the expert drives.
-        remark: Text of a mark to set; "" for no mark.
-    """
-
-    carried_out: NDArray[np.float32]
-    decided: Step
-    remark: str = ""
+DriverDecision = tuple[NDArray[np.float32], Step, str]
+"""Action to pass to the env, shape (n,); step with the action to record as decided, its driver, and
+the action of a policy while the expert drives; and text of a mark to set, "" for no mark."""
 
 
 class Pilot:
@@ -101,25 +91,22 @@ class Pilot:
 
     def decide(self, observation: Any) -> DriverDecision:
         """Return the decision for an observation."""
-        expert = self._expert
+        right = meant = None
+        if self._expert is not None:
+            meant, right = self._expert.act()
         if self._act is None:
-            if expert is None:
+            if right is None:
                 raise DemosError("Nobody drives: give a policy, an expert, or both.")
-            meant, done = expert.act()
-            return DriverDecision(done, Step(action=row(meant), driver="expert"))
-        wanted = self._act(observation)
-        decided = Step(action=row(wanted), driver="policy")
-        if expert is None:
-            return DriverDecision(wanted, decided)
-        right, _ = expert.act()
-        remark = self._change(wanted, right)
-        self.steps += 1
-        if not self._corrects:
-            return DriverDecision(wanted, decided, remark)
-        self.corrected += 1
-        self.takeovers += bool(remark)
-        corrected = Step(action=row(right), driver="expert", wanted=decided.action)
-        return DriverDecision(right, corrected, remark)
+            return right, Step(action=row(meant), driver="expert"), ""
+        wanted, remark = self._act(observation), ""
+        if meant is not None:
+            remark = self._change(wanted, meant)
+            self.steps += 1
+            if self._corrects:
+                self.corrected += 1
+                self.takeovers += bool(remark)
+                return meant, Step(action=row(meant), driver="expert", wanted=row(wanted)), remark
+        return wanted, Step(action=row(wanted), driver="policy"), remark
 
     def _change(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> str:
         """Change the driver if it is time; return the reason, or "" without a change."""
@@ -244,12 +231,12 @@ def record_steps(
             pilot.begin()
             over = False
             while not over:
-                decision = pilot.decide(observation)
-                env.decide(decision.decided)
-                observation, _, terminated, truncated, _ = env.step(decision.carried_out)
+                action, decided, remark = pilot.decide(observation)
+                env.decide(decided)
+                observation, _, terminated, truncated, _ = env.step(action)
                 over = bool(terminated or truncated)
-                if decision.remark and not over:
-                    env.mark(decision.remark)
+                if remark and not over:
+                    env.mark(remark)
                 on_step(env.steps - first)
                 if env.steps - first == steps:
                     return

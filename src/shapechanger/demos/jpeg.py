@@ -6,11 +6,10 @@ simplejpeg is imported on first use, because recordings without images need no d
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.demos.episodes import Driver, Step
 from shapechanger.errors import DemosError, MissingExtra
@@ -103,12 +102,10 @@ COLOURS: Final[dict[Driver, tuple[int, int, int]]] = {
 }
 """Colour of each driver: M. Okabe, K. Ito, "Color universal design", 2008."""
 
-_WIDTH: Final = 480  # Minimum width, pixels.
-_BAR: Final = 14  # Height of one bar, pixels.
 BACKGROUND: Final = (24, 28, 34)
 """Colour of the area below an image, and of episodes without a camera."""
-_MIDDLE: Final = (110, 118, 128)
-_WANTED: Final = (255, 255, 255)
+_MIDDLE, _WANTED = (110, 118, 128), (255, 255, 255)
+_WIDTH, _BAR = 480, 14  # Minimum width, and height of one bar, pixels.
 
 
 def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[np.uint8]:
@@ -127,25 +124,20 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
     """
     times = max(1, math.ceil(_WIDTH / picture.shape[1]))
     large = picture.repeat(times, axis=0).repeat(times, axis=1)
-    width = large.shape[1] - large.shape[1] % 2
-    large = large[: large.shape[0] - large.shape[0] % 2, :width]
+    height, width = (size - size % 2 for size in large.shape[:2])
     reach = np.maximum(1.0, np.abs(step.action))  # Ends of the bars of unbounded values.
     lows = np.where(np.isfinite(layout.low), layout.low, -reach)
     highs = np.where(np.isfinite(layout.high), layout.high, reach)
+    lows, highs = lows - (lows == highs), highs + (lows == highs)
 
-    def columns(values: Sequence[float]) -> list[int]:  # From 0 to the last one.
-        shares = np.full(len(lows), 0.5)
-        above = np.clip(np.nan_to_num(values), lows, highs) - lows
-        np.divide(above, highs - lows, out=shares, where=lows < highs)
+    def columns(values: ArrayLike) -> list[int]:
+        shares = (np.clip(np.nan_to_num(values), lows, highs) - lows) / (highs - lows)
         return np.rint(shares * (width - 1)).astype(int).tolist()
 
     bars = np.full((len(lows), _BAR, width, 3), BACKGROUND, np.uint8)
-    wanted = [None] * len(lows) if step.wanted is None else columns(step.wanted)
-    ends = zip(bars, columns([0.0] * len(lows)), columns(step.action), wanted, strict=True)
-    for bar, zero, value, line in ends:
-        bar[2:-2, min(zero, value) : max(zero, value) + 1] = COLOURS[step.driver]
+    for bar, zero, end in zip(bars, columns(0.0 * lows), columns(step.action), strict=True):
+        bar[2:-2, min(zero, end) : max(zero, end) + 1] = COLOURS[step.driver]
         bar[:, zero] = _MIDDLE
-        if line is not None:
-            place = min(line, width - 2)
-            bar[1:-1, place : place + 2] = _WANTED
-    return np.concatenate([large, *bars])
+    for bar, place in zip(bars, columns(step.wanted) if step.wanted else (), strict=False):
+        bar[1:-1, min(place, width - 2) :][:, :2] = _WANTED
+    return np.concatenate([large[:height, :width], *bars])

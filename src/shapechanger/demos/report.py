@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import simplejpeg
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, Episode, Step
-from shapechanger.demos.jpeg import COLOURS, decode_picture
+from shapechanger.demos.jpeg import COLOURS, decode_picture, encode_picture
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 from shapechanger.reports.page import jpeg_uri, render
@@ -199,7 +198,4 @@ def _thumbnail(episode: Episode, step: Step) -> str:
     except DemosError:  # The page marks it as damaged and shows the rest of the episode.
         return ""
     times = -(-picture.shape[1] // _MAX_WIDTH)
-    if times > 1:
-        small = np.ascontiguousarray(picture[::times, ::times])
-        jpeg = simplejpeg.encode_jpeg(small, quality=85)
-    return jpeg_uri(jpeg)
+    return jpeg_uri(encode_picture(picture[::times, ::times], 85) if times > 1 else jpeg)

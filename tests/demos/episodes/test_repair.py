@@ -1,4 +1,4 @@
-"""A crash at any time costs at most the step being written."""
+"""Repairs: a crash costs at most the step being written. Merges copy only whole episodes."""
 
 import json
 import os
@@ -9,8 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import Drop, EpisodeMark, edit, read_episode, repair
-from shapechanger.errors import BrokenEpisode
+from shapechanger.demos.episodes import (
+    Drop,
+    EpisodeMark,
+    edit,
+    episodes_of,
+    merge,
+    read_episode,
+    repair,
+)
+from shapechanger.errors import BrokenEpisode, DemosError
 from tests.demos.episodes.making import picture, recorded
 
 
@@ -94,3 +102,41 @@ def test_images_without_a_step_are_all_kept(tmp_path: Path) -> None:
     lost = path / "lost"
     assert (lost / "000005.jpg").read_bytes() == picture(5)[:20]
     assert (lost / "000005-0001.jpg").read_bytes() == picture(5)[:30]
+
+
+def test_episodes_are_merged_unchanged(tmp_path: Path) -> None:
+    """Files are equal byte for byte, and names in use get the next number."""
+    one, two = recorded(tmp_path / "a"), recorded(tmp_path / "b", 3)
+    two = two.rename(two.with_name(one.name))
+    done = merge([tmp_path / "a", two], tmp_path / "all")
+    first, second = episodes_of(tmp_path / "all")
+    assert [first.name, second.name] == [one.name, f"{one.name[:-4]}0002"]
+    assert done == [(one, first), (two, second)]
+    for source, target in done:
+        files, copies = (
+            {p.relative_to(path): p.read_bytes() for p in path.rglob("*") if p.is_file()}
+            for path in (source, target)
+        )
+        assert files == copies
+    # An episode is recognized after its steps were judged; nothing is copied then.
+    edit(one, Drop(0, 1, "bad"))
+    recorded(tmp_path / "c")
+    with pytest.raises(DemosError, match="the same episode"):
+        merge([tmp_path / "c", one], tmp_path / "all")
+    assert len(episodes_of(tmp_path / "all")) == 2
+
+
+def test_what_cannot_be_merged_is_refused(tmp_path: Path) -> None:
+    whole, begun = recorded(tmp_path / "a"), recorded(tmp_path / "b", close=False)
+    torn = recorded(tmp_path / "c")
+    with (torn / "steps.jsonl").open("ab") as file:
+        file.write(b'{"kind":"st')
+    for sources, out, reason in (
+        ([begun], tmp_path / "all", "demos repair"),
+        ([torn], tmp_path / "all", "is damaged"),
+        ([], tmp_path / "all", "nothing to merge"),
+        ([whole], whole, "is an episode"),
+    ):
+        with pytest.raises(DemosError, match=reason):
+            merge(sources, out)
+    assert not (tmp_path / "all").exists()

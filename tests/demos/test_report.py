@@ -1,4 +1,4 @@
-"""Statistics of a recording."""
+"""Reports of a recording: statistics, the page, and actions drawn into images."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from shapechanger.demos.episodes import (
     Episode,
     EpisodeMark,
     EpisodeWriter,
+    Step,
     edit,
     read_episode,
 )
 from shapechanger.demos.episodes.records import is_same_rate, rate_jitter
+from shapechanger.demos.jpeg import COLOURS, overlay
 from shapechanger.demos.report import distributions, recording_html
-from tests.demos.episodes.making import header, recorded, step
+from tests.demos.episodes.making import ACTIONS, header, recorded, step
 
 
 def test_the_numbers_of_a_recording(tmp_path: Path) -> None:
@@ -108,3 +110,18 @@ def test_gaps_skip_dropped_steps(tmp_path: Path) -> None:
     path = recorded(tmp_path, 6)
     edit(path, Drop(2, 3, "bad"))
     assert read_episode(path).gaps_s == pytest.approx([0.05, 0.05])
+
+
+@pytest.mark.parametrize("steering", [-1.0, 0.5])
+def test_a_bar_shows_the_action_and_a_white_line_the_suggestion(steering: float) -> None:
+    picture = np.full((30, 40, 3), 7, np.uint8)
+    one = Step(action=(steering, 0.0), driver="person", wanted=(-0.5 * steering, -1.0))
+    drawn = overlay(picture, one, ACTIONS)
+    assert drawn.shape == (30 * 12 + 2 * 14, 480, 3)
+    assert (drawn[: 30 * 12] == 7).all()
+    bar = drawn[30 * 12 + 7]
+    blue = (bar == COLOURS["person"]).all(axis=1)
+    assert (blue[:235].any(), blue[245:].any()) == (steering < 0.0, steering > 0.0)
+    assert blue.sum() == pytest.approx(240 * abs(steering), abs=3)
+    white = np.argwhere((bar == 255).all(axis=1)).ravel()
+    assert white.tolist() == pytest.approx([240 - 120 * steering] * 2, abs=2)
