@@ -57,14 +57,11 @@ def test_observations_are_paired_with_actions(shows: Shows, tmp_path: Path) -> N
         drive(env, 30, seed=3)
         env.end()
     first = read_episode(episodes_of(tmp_path)[0])
-    assert [s.action for s in first.steps] == [(0.5, 1.0)] * 20
-    assert [s.driver for s in first.steps] == ["program"] * 20
-    assert first.steps[0].applied == (0.5, 0.5)
+    decided = [(s.action, s.driver, s.applied) for s in first.steps]
+    assert decided == [((0.5, 1.0), "program", (0.5, 0.5))] * 20
     assert first.outcome == "collision"
-    assert first.steps[-1].terminated
-    assert not first.steps[0].terminated
-    assert first.header.seed == 3
-    assert first.header.control_hz == 10.0
+    assert [s.terminated for s in first.steps] == [False] * 19 + [True]
+    assert (first.header.seed, first.header.control_hz) == (3, 10.0)
     for number, step in enumerate(first.steps):
         way = 0.03 + 0.1 * number
         if shows != "picture":
@@ -84,28 +81,22 @@ def test_observations_are_paired_with_actions(shows: Shows, tmp_path: Path) -> N
     assert len(load_dataset(tmp_path, drivers=("program",))) == 30
 
 
-def test_an_intervention_is_recorded_as_the_persons_action(tmp_path: Path) -> None:
-    inner = CorridorEnv()
+def test_the_intended_action_is_recorded(tmp_path: Path) -> None:
+    """An expert may carry out another one, and a person may intervene."""
+    inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path, driver="policy") as env:
-        env.reset()
-        env.step(FORWARD)
-        inner.more = {"intervene_action": np.array([-1.0, 0.25], np.float32)}
-        env.step(FORWARD)
-    before, after = only(tmp_path).steps
-    assert (before.driver, before.action, before.wanted) == ("policy", (0.5, 1.0), None)
-    assert (after.driver, after.action, after.wanted) == ("person", (-1.0, 0.25), (0.5, 1.0))
-
-
-def test_decide_records_the_intended_action(tmp_path: Path) -> None:
-    with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
         env.reset()
         env.decide(Step(action=(0.0, 0.5), driver="expert", wanted=(1.0, 1.0)))
         env.step(FORWARD)
         env.step(FORWARD)
-    one, two = only(tmp_path).steps
-    assert (one.action, one.driver, one.wanted) == ((0.0, 0.5), "expert", (1.0, 1.0))
-    assert one.applied == (0.5, 0.5)
-    assert (two.action, two.driver, two.wanted) == ((0.5, 1.0), "program", None)
+        inner.more = {"intervene_action": np.array([-1.0, 0.25], np.float32)}
+        env.step(FORWARD)
+    assert [(step.driver, step.action, step.wanted) for step in only(tmp_path).steps] == [
+        ("expert", (0.0, 0.5), (1.0, 1.0)),
+        ("policy", (0.5, 1.0), None),
+        ("person", (-1.0, 0.25), (0.5, 1.0)),
+    ]
+    assert only(tmp_path).steps[0].applied == (0.5, 0.5)
 
 
 def test_bytes_and_times_of_the_env_are_kept_as_they_are(tmp_path: Path) -> None:
@@ -169,25 +160,29 @@ def small_files(size: int) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("size", [100, 4_000])
-def test_a_full_disk_ends_the_recording_and_brings_the_env_to_rest(
-    size: int, tmp_path: Path
-) -> None:
+def test_a_step_that_cannot_be_written_brings_the_env_to_rest(size: int, tmp_path: Path) -> None:
+    """On a full disk, or if time runs backwards."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path) as env:
         env.reset()
         env.step(FORWARD)
         with small_files(size), pytest.raises(OutputError, match=r"Cannot write .*steps"):
             list(map(env.step, 19 * [FORWARD]))
-        assert inner.done[-1] == [0.0, 0.0]
-        assert inner.done[-2] == [0.5, 1.0]
+        assert inner.done[-2:] == [[0.5, 1.0], [0.0, 0.0]]
         with pytest.raises(gym.error.ResetNeeded):
             env.step(FORWARD)
     path = episodes_of(tmp_path)[0]
     repair(path)
     assert len(read_episode(path).steps) == len(inner.done) - 2
+    inner.more = {"captured_ns": 2_000}
     with RecordEpisodes(inner, tmp_path) as env:
         drive(env, 1)
-    assert len(episodes_of(tmp_path)) == 2
+        inner.more = {"captured_ns": 1_000}
+        env.step(FORWARD)
+        with pytest.raises(DemosError, match="time runs backwards"):
+            env.step(FORWARD)
+    assert inner.done[-2:] == [[0.5, 1.0], [0.0, 0.0]]
+    assert len(read_episode(episodes_of(tmp_path)[1]).steps) == 2
 
 
 def test_a_full_episode_goes_on_in_the_next(
@@ -239,32 +234,17 @@ def test_an_env_that_fails_leaves_a_closed_episode(tmp_path: Path) -> None:
     ]
 
 
-def test_time_that_runs_backwards_ends_the_recording(tmp_path: Path) -> None:
-    inner = CorridorEnv("state")
-    inner.more = {"captured_ns": 2_000}
-    with RecordEpisodes(inner, tmp_path) as env:
-        drive(env, 1)
-        inner.more = {"captured_ns": 1_000}
-        env.step(FORWARD)
-        with pytest.raises(DemosError, match="time runs backwards"):
-            env.step(FORWARD)
-    assert inner.done[-1] == [0.0, 0.0]
-    assert len(only(tmp_path).steps) == 2
-
-
 def test_unsuitable_envs_are_refused(tmp_path: Path) -> None:
     """Invalid observations and missing layouts raise errors."""
     with pytest.raises(LayoutError, match="CartPole-v1 publishes no observation_layout"):
         RecordEpisodes(gym.make("CartPole-v1"), tmp_path)
-    wrong: Any = CorridorEnv("state")
-    wrong.action_layout = wrong.observation_layout
-    wrong.action_space = gym.spaces.Box(-1.0, 1.0, (3,))
-    with pytest.raises(DemosError, match="The action space of CorridorEnv is Box"):
-        RecordEpisodes(wrong, tmp_path)
-    odd: Any = CorridorEnv("both")
-    odd.observation_space = gym.spaces.Dict({"sound": gym.spaces.Box(-1.0, 1.0, (2,))})
-    with pytest.raises(DemosError, match="The sound space of CorridorEnv"):
-        RecordEpisodes(odd, tmp_path)
-    odd.observation_space = gym.spaces.Discrete(2)
-    with pytest.raises(DemosError, match="The state space of CorridorEnv"):
-        RecordEpisodes(odd, tmp_path)
+    sound = gym.spaces.Dict({"sound": gym.spaces.Box(-1.0, 1.0, (2,))})
+    for kind, space, name in (
+        ("state", gym.spaces.Discrete(2), "observation_space"),
+        ("sound", sound, "observation_space"),
+        ("action", gym.spaces.Box(-1.0, 1.0, (3,)), "action_space"),
+    ):
+        odd: Any = CorridorEnv("both")
+        setattr(odd, name, space)
+        with pytest.raises(DemosError, match=f"The {kind} space of CorridorEnv is "):
+            RecordEpisodes(odd, tmp_path)

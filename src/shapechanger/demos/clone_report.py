@@ -9,6 +9,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from shapechanger.demos.cloning.evaluation import Bin, EvaluationResult, named
 from shapechanger.files import write_atomic, write_json
 from shapechanger.policy import PolicyCard
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
 _MAX_SCATTERS: Final = 4
 _MAGNIFICATION: Final = 3
+_DIAGONAL: Final[dict[str, Any]] = {"color": "#777777", "linestyle": "--", "linewidth": 1.0}
 _MEMBER_COLOURS: Final = (BLUE, ORANGE, GREEN, PINK, GREY)
 
 
@@ -76,8 +79,8 @@ def write_report(
 def _worst(policy: Clone, data: Dataset, evaluation: EvaluationResult) -> list[dict[str, Any]]:
     """The steps with the largest errors: what the driver did, and what the policy did."""
     chosen = list(evaluation.worst)
-    arrays = (data.pictures, data.states)
-    pictures, states = (None if seen is None else seen[chosen] for seen in arrays)
+    pictures = None if data.pictures is None else data.pictures[chosen]
+    states = None if data.states is None else data.states[chosen]
     outputs, actions = policy.outputs(pictures, states), policy.predict_many(pictures, states)
     frames: list[dict[str, Any]] = []
     for i, step in enumerate(chosen):
@@ -133,11 +136,12 @@ def calibration_chart(bins: tuple[Bin, ...]) -> str:
     """Plot accuracy over confidence; each point is labelled with its number of steps."""
 
     def draw(_: Figure, axes: Axes) -> None:
-        axes.plot([0, 1], [0, 1], color="#777777", linestyle="--", linewidth=1.0)
+        axes.plot([0, 1], [0, 1], **_DIAGONAL)
         sure, right = [b.confidence for b in bins], [b.accuracy for b in bins]
         axes.plot(sure, right, color=BLUE, marker="o", linewidth=1.5)
-        for x, y, one in zip(sure, right, bins, strict=True):
-            axes.annotate(str(one.steps), (x, y), (4, -12), textcoords="offset points")
+        for one in bins:
+            at = (one.confidence, one.accuracy)
+            axes.annotate(str(one.steps), at, (4, -12), textcoords="offset points")
         axes.set(xlim=(0, 1), ylim=(0, 1.05), xlabel="confidence", ylabel="accuracy")
 
     return svg_chart(SQUARE, draw)
@@ -147,10 +151,9 @@ def scatter_chart(evaluation: EvaluationResult, place: int) -> str:
     """Plot one number of each action: the policy's over the driver's."""
 
     def draw(_: Figure, axes: Axes) -> None:
-        sides = (evaluation.target, evaluation.predicted)
-        target, predicted = ([row[place] for row in rows] for rows in sides)
+        target, predicted = np.array([evaluation.target, evaluation.predicted])[:, :, place]
         ends = [min(*target, *predicted), max(*target, *predicted)]
-        axes.plot(ends, ends, color="#777777", linestyle="--", linewidth=1.0)
+        axes.plot(ends, ends, **_DIAGONAL)
         axes.scatter(target, predicted, s=9, alpha=0.35, color=BLUE, linewidths=0, rasterized=True)
         axes.set(xlabel="driver", ylabel="policy")
 
@@ -163,11 +166,11 @@ def training_chart(training: Training) -> str:
     def draw(_: Figure, axes: Axes) -> None:
         for member, best in enumerate(training.best_steps):
             colour = _MEMBER_COLOURS[member % len(_MEMBER_COLOURS)]
-            own = [check for check in training.checks if check.member == member]
-            steps, errors = [c.step for c in own], [c.error for c in own]
-            axes.plot(steps, [c.loss for c in own], color=colour, linestyle="--", linewidth=0.9)
-            axes.plot(steps, errors, color=colour, linewidth=1.6)
-            axes.plot([best], [errors[steps.index(best)]], color=colour, marker="o")
+            own = {check.step: check for check in training.checks if check.member == member}
+            losses, errors = [c.loss for c in own.values()], [c.error for c in own.values()]
+            axes.plot([*own], losses, color=colour, linestyle="--", linewidth=0.9)
+            axes.plot([*own], errors, color=colour, linewidth=1.6)
+            axes.plot([best], [own[best].error], color=colour, marker="o")
         axes.set(xlabel="steps of training", ylabel="loss")
 
     return svg_chart(WIDE, draw)

@@ -323,9 +323,8 @@ def repair(path: Path) -> str:
     with lock(path / STEPS, f"{path} is being recorded at this moment."), writing(path):
         lines = list(_checked_lines(path, header, thorough=True))
         kept = [line for _, line, wrong in lines if isinstance(line, Step) and not wrong]
-        used = {step.frame for step in kept}
-        strays = sorted(p for p in (path / FRAMES).glob("*") if p.name not in used)
         wrongs = [wrong for _, _, wrong in lines if wrong]
+        strays = {*(path / FRAMES).glob("*")} - {path / FRAMES / step.frame for step in kept}
         if wrongs or strays:
             (path / _LOST).mkdir(exist_ok=True)
         if wrongs:
@@ -334,18 +333,14 @@ def repair(path: Path) -> str:
             write_atomic(path / STEPS, b"".join(raw for raw, _, wrong in lines if not wrong))
             more = f" and {len(wrongs) - 1} more" if len(wrongs) > 1 else ""
             done.append(f"moved a line{more} aside, because {wrongs[0]}")
-        for stray in strays:
+        for stray in sorted(strays):
             stray.rename(free_path(path / _LOST, stray.stem, stray.suffix))
         if strays:
             done.append(f"moved aside unused images: {len(strays)}")
         if outcome is None:
             write_header(path, header, {"steps": len(kept), "outcome": "cut off"})
             done.append("closed it")
-    return (
-        ", ".join([f"kept {len(kept)} steps", *done])
-        if done
-        else f"was complete, with {len(kept)} steps"
-    )
+    return ", ".join([f"kept {len(kept)} steps", *(done or ["nothing was wrong"])])
 
 
 def edit(path: Path, line: Edit) -> None:

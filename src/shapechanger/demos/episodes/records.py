@@ -43,15 +43,15 @@ def is_episode(folder: Path) -> bool:
 
 def free_path(folder: Path, stem: str, ending: str = "") -> Path:
     """Return a path in `folder` that does not exist, with the next free number where needed."""
-    path, begun, number = folder / f"{stem}{ending}", stem, 0
     counted = re.fullmatch(r"(.*)-([0-9]{4})", stem, re.DOTALL)
-    if counted and int(counted[2]) < _MOST_OF_A_NAME:
-        begun, number = counted[1], int(counted[2])
-    while os.path.lexists(path):
-        if (number := number + 1) > _MOST_OF_A_NAME:
-            raise OutputError(f"{folder} has too many files with names like {stem}{ending}.")
-        path = folder / f"{begun}-{number:04d}{ending}"
-    return path
+    begun, number = (counted[1], int(counted[2])) if counted else (stem, 0)
+    if number == _MOST_OF_A_NAME:
+        begun, number = stem, 0
+    numbered = (f"{begun}-{n:04d}" for n in range(number + 1, _MOST_OF_A_NAME + 1))
+    for name in (stem, *numbered):
+        if not os.path.lexists(path := folder / f"{name}{ending}"):
+            return path
+    raise OutputError(f"{folder} has too many files with names like {stem}{ending}.")
 
 
 def lock(path: Path, busy: str) -> io.FileIO:
