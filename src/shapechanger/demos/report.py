@@ -65,20 +65,17 @@ def distributions(episodes: Sequence[Episode]) -> list[Distribution]:
         layout = one.header.actions
         for name, place in list(layout.slices.items())[:_MAX_ACTIONS]:
             add(layout[name], (value for step in one.kept for value in step.action[place]))
-    for one in episodes:
         layout, places = one.header.states, one.header.states.slices
         for name in filter(places.get, _MEASURED):
             values = (value for step in one.kept for value in step.state[places[name]])
             add(Feature(name, layout[name].unit), values)
-    for one in episodes:
         add(Feature("time between steps", "ms"), (1e3 * gap for gap in one.gaps_s))
-    pooled = [(feature, np.array(values, np.float64)) for feature, values in found.values()]
-    finite = [(feature, values, np.isfinite(values)) for feature, values in pooled]
-    return [
-        Distribution(f, v[is_known], (~is_known).sum())
-        for f, v, is_known in finite
-        if any(is_known)
-    ]
+    pooled: list[Distribution] = []
+    for feature, values in found.values():
+        finite = np.array([value for value in values if math.isfinite(value)])
+        if len(finite):
+            pooled.append(Distribution(feature, finite, len(values) - len(finite)))
+    return pooled
 
 
 def recording_html(name: str, episodes: Sequence[Episode], broken: Sequence[str] = ()) -> str:
@@ -144,23 +141,19 @@ def _timeline(episode: Episode) -> dict[str, Any]:
         indexes = [step.index for step in run]
         runs.append((indexes[0], indexes[-1], who))
     drawn = episode.steps[:: math.ceil(len(episode.steps) / _MAX_POINTS)]
-    bounds = np.abs([layout.low, layout.high])  # Unbounded values are drawn from -1 to 1.
-    bounds = np.where(np.isfinite(bounds), bounds, np.nan)
-    reaches = np.nan_to_num(np.fmax(*bounds), nan=1.0)
-    traces: list[tuple[str, str, list[tuple[int, float]]]] = []
-    for place, (name, colour) in enumerate(zip(layout.names, _TRACE_COLOURS, strict=False)):
-        values = np.clip(
-            [step.action[place] / (reaches[place] or 1.0) for step in drawn], -1.0, 1.0
-        )
-        points = zip((step.index - first for step in drawn), values.tolist(), strict=True)
-        traces.append((name, colour, list(points)))
+    bounds = np.abs([layout.low, layout.high])
+    reaches = np.where(np.isfinite(bounds), bounds, 0.0).max(axis=0)
+    reaches[reaches == 0.0] = 1.0  # Unbounded values are drawn from -1 to 1.
+    heights = np.clip(np.array([step.action for step in drawn]) / reaches, -1.0, 1.0)
+    places = [step.index - first for step in drawn]
+    traces = zip(layout.names, _TRACE_COLOURS, heights.T.tolist(), strict=False)
     return {
         "first": first,
         "length": episode.steps[-1].index - first + 1,
         "runs": runs,
         "names": layout.names,
-        "traces": traces,
-        "reach": np.nanmax(bounds, initial=0.0) if np.isfinite(bounds).any() else 1.0,
+        "traces": [(*who, list(zip(places, y, strict=True))) for *who, y in traces],
+        "reach": reaches.max(),
     }
 
 
