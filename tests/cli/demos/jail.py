@@ -21,7 +21,6 @@ import simplejpeg  # noqa: F401
 
 from shapechanger.cli import main
 from shapechanger.demos import (  # noqa: F401
-    merging,
     recording,
     report,
 )

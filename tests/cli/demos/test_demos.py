@@ -135,7 +135,7 @@ def test_repair(data: Path, demos: Cli) -> None:
     printed = demos.output("repair", data)
     assert f"{first.name}: kept 30 steps, moved a line aside, because it is cut off" in printed
     assert f"{second.name}: kept 9 steps, moved a line aside" in printed
-    assert demos.output("repair", data).count("was complete") == 2
+    assert demos.output("repair", data).count("nothing was wrong") == 2
 
 
 def test_one_episode_must_be_named(data: Path, demos: Cli) -> None:
