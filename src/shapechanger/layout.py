@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import fnmatch
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final, Literal
 
 import msgspec
@@ -209,3 +209,12 @@ class Layout(msgspec.Struct, frozen=True):
 
     def _per_number(self, values: list[float]) -> NDArray[np.float64]:
         return np.repeat(np.asarray(values, dtype=np.float64), [f.size for f in self.features])
+
+
+def value_names(layout: Iterable[Feature]) -> list[str]:
+    """Return a name for each value of a layout; those of a block are numbered, as in `map[3]`."""
+    return [
+        f"{feature.name}[{place}]" if feature.shape else feature.name
+        for feature in layout
+        for place in range(feature.size)
+    ]

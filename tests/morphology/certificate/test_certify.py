@@ -33,7 +33,7 @@ def test_a_longer_arm_is_certified() -> None:
 
 
 def test_an_empty_shift_is_refused_unless_it_is_allowed() -> None:
-    with pytest.raises(EmptyShift, match="behave the same: both models have the fingerprint"):
+    with pytest.raises(EmptyShift, match="behave the same: their models and 100 steps are equal"):
         certify(Swing(), Swing())
     certificate = certify(Swing(), Swing(), steps=5, allow_empty=True)
     assert certificate.is_empty

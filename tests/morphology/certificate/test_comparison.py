@@ -12,7 +12,6 @@ import pytest
 from shapechanger.morphology.certificate.changes import (
     Change,
     compare,
-    fingerprints,
     grouped,
 )
 from tests.morphology.scenes import asset, asset_spec, everything
@@ -92,7 +91,7 @@ def _extend(spec: mujoco.MjSpec) -> None:
                 "toe: joint added (hinge)",
                 "toe: actuator added (toe)",
                 "floor + foot: contact added (3)",
-                "nq: dimensions 15 -> 16",
+                "nq: dimensions 15 -> 16 (x1.07)",
             ],
         ),
         # Friction below that of the floor has no effect, as in two hopper tasks of ODRL.
@@ -106,7 +105,7 @@ def test_a_difference_is_a_sentence(
     """And the way back is the same change the other way round."""
     source, target = asset("ant"), _edited(edit)
     changes, back = compare(source, target), compare(target, source)
-    found = [item.sentence for item in grouped(changes)]
+    found = grouped(changes)
     assert set(sentences) <= set(found)
     assert bool(found) == bool(sentences)
     mirrored = {(item.quantity, item.element, item.after, item.before) for item in back}
@@ -177,16 +176,8 @@ def test_derived_constants_are_listed_only_when_alone() -> None:
         (("a",), ("b",), "a -> b"),
         ((-math.inf, math.inf), (-1.0, 1.0), "(-inf, inf) -> (-1, 1)"),
         # Enough digits are shown to tell the two numbers apart.
-        ((0.1,), (0.1 + 1e-7,), "0.1 -> 0.1000001"),
-        ((0.1,), (math.nextafter(0.1, 1.0),), "0.10000000000000001 -> 0.10000000000000002"),
+        ((0.1,), (math.nextafter(0.1, 1.0),), "0.1 -> 0.10000000000000002"),
     ],
 )
 def test_numbers_are_shown_with_a_common_ratio(before: Any, after: Any, words: str) -> None:
     assert Change("mass", "leg", before, after).sentence == f"leg: mass {words}"
-
-
-@pytest.mark.parametrize("drawn", [False, True])
-def test_fingerprints_tell_models_apart(drawn: bool) -> None:
-    found = fingerprints(asset("ant"), drawn=drawn)
-    assert fingerprints(asset("ant"), drawn=drawn) == found
-    assert fingerprints(_edited(_longer), drawn=drawn)[0] != found[0]

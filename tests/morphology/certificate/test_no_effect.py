@@ -165,4 +165,4 @@ def test_another_end_of_the_episode_is_no_rounding() -> None:
     certificate = certify(Swing(), _Ends(Swing()))
     assert certificate.same_model
     assert not certificate.is_empty
-    assert certificate.verdict.endswith("only what is sensed, done or rewarded differs.")
+    assert certificate.verdict.endswith("are the same; what is sensed, done or rewarded differs.")

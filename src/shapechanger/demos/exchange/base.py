@@ -284,15 +284,6 @@ def decoded_images(
         yield record, pixels
 
 
-def value_names(layout: Iterable[Feature]) -> list[str]:
-    """Return a name for each value of a layout; those of a block are numbered, as in `map[3]`."""
-    return [
-        f"{feature.name}[{place}]" if feature.shape else feature.name
-        for feature in layout
-        for place in range(feature.size)
-    ]
-
-
 def drives(
     sessions: Sequence[list[ExchangeRecord]],
     header: EpisodeHeader,

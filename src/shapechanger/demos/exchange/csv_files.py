@@ -24,6 +24,7 @@ import msgspec
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange import base, files
 from shapechanger.errors import DemosError, translate_errors
+from shapechanger.layout import value_names
 
 _TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
@@ -53,7 +54,7 @@ def _tables_of(folder: Path) -> list[Path]:
 
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
-    actions, states = base.value_names(header.actions), base.value_names(header.states)
+    actions, states = value_names(header.actions), value_names(header.states)
     values = dict.fromkeys(_VECTORS, actions) | {"state": states}
     return {
         field: [name + value for value in values.get(field, [""])] for field, name in _NAMES.items()

@@ -34,11 +34,11 @@ from shapechanger.demos.exchange.base import (
     ExchangeEpisode,
     ExportContext,
     decoded_images,
-    value_names,
 )
 from shapechanger.demos.exchange.files import library
 from shapechanger.demos.exchange.video import VideoWriter
 from shapechanger.errors import DemosError
+from shapechanger.layout import value_names
 
 INFO: Final = "meta/info.json"
 EPISODES: Final = "meta/episodes"

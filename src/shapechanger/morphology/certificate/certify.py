@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import msgspec
 import mujoco
@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.identity import modules_of_env, own_modules
+from shapechanger.layout import Layout, value_names
 from shapechanger.morphology.certificate.changes import Change, compare, fingerprint, grouped
 from shapechanger.morphology.certificate.numbers import KINDS, TABLE, names_of
 
-if TYPE_CHECKING:
-    from shapechanger.layout import Layout
-
 _Floats = NDArray[np.float64]
+_Range = tuple[float, float]
 # `mj_setConst` gives the same bits on an untouched model; the margin is for models that were
 # compiled elsewhere and loaded from a file.
 _STALE: Final = 1e-6
@@ -107,19 +106,13 @@ class Certificate(msgspec.Struct, frozen=True):
     def verdict(self) -> str:
         """Verdict in one sentence."""
         both, steps = f"{self.source} and {self.target}", f"{self.rollout.steps} steps"
-        same_prints = self.source_fingerprint == self.target_fingerprint
-        if self.is_empty and same_prints and self.rollout.identical:
-            return (
-                f"{both} behave the same: both models have the fingerprint "
-                f"{self.source_fingerprint}, and {steps} gave the same numbers."
-            )
         if self.is_empty:
-            return f"{both} behave the same: their models and {steps} differ by rounding."
+            prints = self.source_fingerprint, self.target_fingerprint
+            equal = self.rollout.identical and prints[0] == prints[1]
+            how = "are equal" if equal else "differ by rounding"
+            return f"{both} behave the same: their models and {steps} {how}."
         if self.same_model:
-            return (
-                f"The models of {both} are the same ({self.source_fingerprint}); only what is "
-                "sensed, done or rewarded differs."
-            )
+            return f"The models of {both} are the same; what is sensed, done or rewarded differs."
         if self.rollout.differs_by_rounding:
             return f"The models of {both} differ, but {steps} did not show it."
         return f"{self.target} behaves differently from {self.source}."
@@ -131,16 +124,16 @@ class Certificate(msgspec.Struct, frozen=True):
             f"{self.target} [{self.target_fingerprint}]",
             self.verdict,
         ]
-        for title, sentences in (
-            ("Changes", [item.sentence for item in grouped(self.changes)]),
+        for title, entries in (
+            ("Changes", grouped(self.changes)),
             ("Rollout", [str(self.rollout)]),
             (f"Does not fit together in {self.source}", self.source_inconsistencies),
             (f"Does not fit together in {self.target}", self.target_inconsistencies),
             (f"Own files of {self.source}", [f"{n} [{d}]" for n, d in self.source_files.items()]),
             (f"Own files of {self.target}", [f"{n} [{d}]" for n, d in self.target_files.items()]),
         ):
-            if sentences:
-                lines += [f"{title}:", *(f"  {sentence}" for sentence in sentences)]
+            if entries:
+                lines += [f"{title}:", *(f"  {entry}" for entry in entries)]
         return "\n".join(lines)
 
 
@@ -172,16 +165,13 @@ def certify(
         MorphologyError: If one of them has no model, such as a vehicle's env.
         EmptyShift: If there is no difference and `allow_empty` is false.
     """
-    inner, labelled = list[Any](), list[str]()
-    for env in (source, target):
-        inner.append(getattr(env, "unwrapped", env))
-        spec = getattr(getattr(env, "spec", None), "id", None)
-        labelled.append(str(getattr(inner[-1], "label", None) or spec or type(inner[-1]).__name__))
-        if not hasattr(inner[-1], "model"):
-            raise MorphologyError(f"{labelled[-1]} has no model to compare.")
+    inner = [getattr(env, "unwrapped", env) for env in (source, target)]
+    names = labels or tuple(map(_label, (source, target), inner))
+    for each, name in zip(inner, names, strict=True):
+        if not hasattr(each, "model"):
+            raise MorphologyError(f"{name} has no model to compare.")
     one, two = (each.model for each in inner)
     old_height, new_height = (getattr(each, "standing_height", None) for each in inner)
-    names = labels or labelled
     certificate = Certificate(
         source=names[0],
         target=names[1],
@@ -202,6 +192,11 @@ def certify(
     return certificate
 
 
+def _label(env: Any, inner: Any) -> str:
+    spec_id = getattr(getattr(env, "spec", None), "id", None)
+    return str(getattr(inner, "label", None) or spec_id or type(inner).__name__)
+
+
 def matched_commands(
     source: Layout, target: Layout, steps: int, seed: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -210,40 +205,32 @@ def matched_commands(
     The numbers of a motor depend on the seed and its name alone. They lie where the ranges of the
     two overlap. The commands of each have the shape (steps, size of its layout).
     """
-    ranges = _ranges(source), _ranges(target)
-    drawn: dict[str, _Floats] = {}
-    for name in ranges[0].keys() & ranges[1].keys():
-        lows, highs = zip(ranges[0][name], ranges[1][name], strict=True)
-        share = np.random.default_rng([seed, *name.encode()]).random(steps)
-        drawn[name] = max(lows) + (min(highs) - max(lows)) * share
-    one, two = (np.zeros((steps, len(own)), np.float32) for own in ranges)
-    for commands, own in ((one, ranges[0]), (two, ranges[1])):
+    one, two = (dict(zip(value_names(s), _ranges(s), strict=True)) for s in (source, target))
+
+    def draw(own: dict[str, _Range], other: dict[str, _Range]) -> NDArray[np.float32]:
+        commands = np.zeros((steps, len(own)), np.float32)
         for place, (name, bounds) in enumerate(own.items()):
-            low, high = np.asarray(bounds, np.float32)
-            commands[:, place] = np.clip(drawn.get(name, np.zeros(steps)), low, high)
-    return one, two  # Spaces of double precision accept single precision too.
+            values = np.zeros(steps)
+            if name in other:
+                lows, highs = zip(bounds, other[name], strict=True)
+                share = np.random.default_rng([seed, *name.encode()]).random(steps)
+                values = max(lows) + (min(highs) - max(lows)) * share
+            commands[:, place] = np.clip(values, *np.asarray(bounds, np.float32))
+        return commands
+
+    return draw(one, two), draw(two, one)
 
 
-def _ranges(layout: Layout) -> dict[str, tuple[float, float]]:
+def _ranges(layout: Layout) -> list[_Range]:
     """Return a finite range for each number: to -1 or 1, or beyond, where it has no bound."""
     low, high = layout.low, layout.high
     bottom = np.where(np.isfinite(low), low, np.minimum(-1.0, high - 1.0))
     top = np.where(np.isfinite(high), high, np.maximum(1.0, low + 1.0))
-    ranges = zip(bottom.tolist(), top.tolist(), strict=True)
-    return dict(zip(_number_names(layout), ranges, strict=True))
-
-
-def _number_names(layout: Layout) -> list[str]:
-    """Return one name per number of a vector: `camera[0]`, `camera[1]` for a block."""
-    names: list[str] = []
-    for feature in layout:
-        blocks = [f"{feature.name}[{i}]" for i in range(feature.size)]
-        names += blocks if feature.shape else [feature.name]
-    return names
+    return list(zip(bottom.tolist(), top.tolist(), strict=True))
 
 
 def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 0) -> Rollout:
-    """Reset two environments with one seed, give them the same commands, and compare the responses.
+    """Reset two environments with one seed, give them the same commands and compare the responses.
 
     A command is drawn per motor name, so a motor that both have gets the same number whatever
     other motors there are; a motor that one lacks gets zero. The source runs first and the target
@@ -253,28 +240,27 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
     commands = matched_commands(_layout(source, "action"), _layout(target, "action"), steps, seed)
     before, over = _drive(source, commands[0], seed)
     after, new_over = _drive(target, commands[1], seed)
-    old, new = (_number_names(_layout(env, "observation")) for env in (source, target))
+    rows = min(len(before), len(after))
+    ended = over and len(before) == rows, new_over and len(after) == rows
+    old, new = (value_names(_layout(env, "observation")) for env in (source, target))
     sizes = before.shape[1] - 1, after.shape[1] - 1
     if (len(old), len(new)) != sizes:  # A wrapper has changed the numbers: use their places.
         old, new = ([f"observation[{place}]" for place in range(size)] for size in sizes)
     shared = [name for name in old if name in frozenset(new)]
-    rows = min(len(before), len(after))
     gaps, excess = _gaps(
         before[:rows, [*map(old.index, shared), -1]], after[:rows, [*map(new.index, shared), -1]]
     )
-    ended = over and len(before) == rows, new_over and len(after) == rows
-    only = [name for name in old if name not in shared], [n for n in new if n not in shared]
     observed, reward = gaps[:, :-1], float(gaps[:, -1].max())
-    parted = np.flatnonzero(observed.any(axis=1)).tolist()
     sentences = [f"the {len(shared)} numbers that both observe are equal throughout."]
-    if parted:
-        when = f"at step {parted[0]}" if parted[0] else "at the reset"
-        # The first of equal differences.
+    if observed.any():
+        first = int(np.argmax(observed.any(axis=1)))
         step, most = np.unravel_index(int(np.argmax(observed)), observed.shape)
         sentences = [
-            f"observations part {when} in {shared[int(np.argmax(observed[parted[0]]))]}, and "
-            f"furthest at step {step} in {shared[most]}, by {observed.max():.4g}."
+            f"observations part at {f'step {first}' if first else 'the reset'} in "
+            f"{shared[int(np.argmax(observed[first]))]}, and furthest at step {step} in "
+            f"{shared[most]}, by {observed.max():.4g}."
         ]
+    only = [[n for n in old if n not in shared], [n for n in new if n not in shared]]
     for whose, names in zip(("source", "target"), only, strict=True):
         if names:
             sentences += [f"Only the {whose} observes {len(names)} more, such as {names[0]}."]

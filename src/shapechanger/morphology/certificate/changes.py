@@ -14,16 +14,16 @@ import numpy as np
 from shapechanger.morphology.certificate.numbers import (
     KINDS,
     MOVED,
-    SENSED,
     Field,
     Numbers,
     Values,
     moved_numbers,
     names_of,
-    sensed_numbers,
+    sensed_values,
 )
 
 _Elements = dict[str, dict[str, Values]]
+_Row = tuple[str, str, float | None, float | None, str]  # As a `Change`, of one number.
 ROUNDING: Final = 1e-9
 """Part of a field's largest number up to which two numbers are equal. Writing out a total mass,
 another order of a sum and another processor change the last bits, and constants that MuJoCo derives
@@ -41,8 +41,6 @@ _TITLES: Final = {section: title for section, (title, _, _) in KINDS.items()} | 
     "whole": "array",
 }
 _DESCRIBED_BY: Final = {"bodies": "mass", "actuators": "target", "contacts": "contact dimension"}
-# Quantities whose ratios mean nothing.
-_WITHOUT_RATIO: Final = frozenset(("orientation", "inertia axes", "axis", "dimensions"))
 _ROUND: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 
 
@@ -67,42 +65,38 @@ class Change(msgspec.Struct, frozen=True):
     @property
     def sentence(self) -> str:
         """The change in words."""
-        return f"{self.element}: {self.quantity} {self._words()}"
+        return f"{self.element}: {self.difference}"
 
-    def _words(self) -> str:
-        """Return both values, with as many digits as it takes to tell them apart."""
+    @property
+    def difference(self) -> str:
+        """The change in words, without the element."""
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
         if self.quantity in _TITLES.values():
             there, done = (self.before, "removed") if self.after is None else (self.after, "added")
-            return f"{done} ({_shown(there, 4)}{unit})"
-        texts = ["", ""]
-        for digits in (4, 8, 17):
-            texts = [_shown(values, digits) for values in (self.before, self.after)]
-            if texts[0] != texts[1]:
+            return f"{self.quantity} {done} ({_shown(there, '.4g', unit)})"
+        for digits in (".4g", ""):  # As many as it takes to tell them apart.
+            old, new = (_shown(values, digits, unit) for values in (self.before, self.after))
+            if old != new:
                 break
-        words = " -> ".join(text if text == "none" else f"{text}{unit}" for text in texts)
-        if self.quantity in _WITHOUT_RATIO:
-            return words
-        return words + _times(self.before or (), self.after or ())
+        return f"{self.quantity} {old} -> {new}{_times(self.before or (), self.after or ())}"
 
 
-def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
-    """Merge changes that are the same for several elements."""
-    groups: dict[str, list[Change]] = {}
+def grouped(changes: Iterable[Change]) -> list[str]:
+    """Return a sentence for each change, one for several elements that change in the same way."""
+    groups: dict[str, list[str]] = {}
     for item in changes:
-        groups.setdefault(item.sentence.removeprefix(f"{item.element}: "), []).append(item)
-    return tuple(
-        msgspec.structs.replace(members[0], element=", ".join(each.element for each in members))
-        for members in groups.values()
-    )
+        groups.setdefault(item.difference, []).append(item.element)
+    return [f"{', '.join(elements)}: {text}" for text, elements in groups.items()]
 
 
-def _shown(values: Values | None, digits: int) -> str:
-    """Format values with so many significant digits; equal numbers of a list are shown once."""
-    texts = [v if isinstance(v, str) else f"{v:.{digits}g}" for v in values or ()] or ["none"]
+def _shown(values: Values | None, digits: str, unit: str) -> str:
+    """Format values with a format of numbers; equal numbers of a list are shown once."""
+    if not values:
+        return "none"
+    texts = [value if isinstance(value, str) else f"{value:{digits}}" for value in values]
     if len(texts) == 1:
-        return texts[0]
-    return f"{texts[0]} each" if len(set(texts)) == 1 else f"({', '.join(texts)})"
+        return texts[0] + unit
+    return (f"{texts[0]} each" if len(set(texts)) == 1 else f"({', '.join(texts)})") + unit
 
 
 def _times(before: Values, after: Values) -> str:
@@ -140,88 +134,72 @@ def compare(
         The changes: standing height, dimensions and total mass first, then element by element.
         Empty for models whose elements have the same names and numbers.
     """
-    changes: list[Change] = []
-    before, after = standing_height
-    if before is not None and after is not None and not _equal((before,), (after,)):
-        changes.append(Change("standing height", "robot", (before,), (after,), "m"))
+    robot: list[_Row] = [("standing height", "robot", *standing_height, "m")]
     one, two = moved_numbers(source), moved_numbers(target)
-    found = differences(one, two)
-    if not found:
-        return tuple(changes)
-    if source.nbody != target.nbody:
-        old, new = float(source.nbody), float(target.nbody)
-        changes.append(Change("dimensions", "nbody", (old,), (new,), "1"))
-    old, new = (math.fsum(m.body_mass[m.body_treeid >= 0].tolist()) for m in (source, target))
-    # The order of the bodies may change the last digit of the sum.
-    if not math.isclose(old, new, rel_tol=ROUNDING):
-        changes.append(Change("total mass", "robot", (old,), (new,), "kg"))
-    lengths, measured = _lengths(source, target, one, two)
-    changes += lengths
-    if found[0].quantity == "derived constant" and changes:
-        return tuple(changes)
-    found = (item for item in found if item.quantity != "size" or item.element not in measured)
-    return (*changes, *found)
+    found, measured = list[Change](), set[str]()
+    for section, fields in MOVED.items():
+        found += _differences(section, fields, one[section], two[section])
+    derived = [
+        Change("derived constant", name, fields["values"], two["derived"][name]["values"])
+        for name, fields in one["derived"].items()
+        if not _equal(fields["values"], two["derived"][name]["values"])
+    ]
+    if found or derived:
+        # The order of the bodies may change the last digit of the sum.
+        old, new = (math.fsum(m.body_mass[m.body_treeid >= 0].tolist()) for m in (source, target))
+        robot.append(("dimensions", "nbody", float(source.nbody), float(target.nbody), "1"))
+        robot.append(("total mass", "robot", old, new, "kg"))
+        lengths, measured = _lengths(source, target, one, two)
+        robot += lengths
+    changes = [
+        Change(quantity, element, (old,), (new,), unit)
+        for quantity, element, old, new, unit in robot
+        if old is not None and new is not None and not _equal((old,), (new,))
+    ]
+    changes += [each for each in found if each.quantity != "size" or each.element not in measured]
+    # Constants that MuJoCo derives count only if all other numbers are equal.
+    return tuple(changes or derived)
 
 
 def _lengths(
     source: mujoco.MjModel, target: mujoco.MjModel, one: Numbers, two: Numbers
-) -> tuple[list[Change], set[str]]:
-    """Return changes of the lengths, without caps, and radii of round geoms, and their names.
+) -> tuple[list[_Row], set[str]]:
+    """Return lengths, without caps, and radii of round geoms in both models, and their names.
 
     A geom that touches nothing is reported only if its body differs; one that is the only one of
     its body is called by the name of the body.
     """
-    found, measured = list[Change](), set[str]()
+    found, measured = list[_Row](), set[str]()
     names, targets = names_of(source), names_of(target)["geoms"]
     for i, geom in enumerate(names["geoms"]):
-        kind, owner = source.geom_type[i], int(source.geom_bodyid[i])
-        j = targets.index(geom) if kind in _ROUND and geom in targets else -1
-        if j < 0 or target.geom_type[j] != kind:
+        j = targets.index(geom) if geom in targets else -1
+        if j < 0 or not source.geom_type[i] == target.geom_type[j] in _ROUND:
             continue
         measured.add(geom)
+        owner = int(source.geom_bodyid[i])
         body = names["bodies"][owner]
         touches = geom in one["geoms"] and geom in two["geoms"]
-        if not touches and one["bodies"].get(body) == two["bodies"].get(body):
-            continue
-        label = body if source.body_geomnum[owner] == 1 else geom
-        old, new = source.geom_size[i].tolist(), target.geom_size[j].tolist()
-        for quantity, a, b in (("length", 2.0 * old[1], 2.0 * new[1]), ("radius", old[0], new[0])):
-            if not _equal((a,), (b,)):
-                found.append(Change(quantity, label, (a,), (b,), "m"))
+        if touches or one["bodies"].get(body) != two["bodies"].get(body):
+            label = body if source.body_geomnum[owner] == 1 else geom
+            old, new = source.geom_size[i].tolist(), target.geom_size[j].tolist()
+            found.append(("length", label, 2.0 * old[1], 2.0 * new[1], "m"))
+            found.append(("radius", label, old[0], new[0], "m"))
     return found, measured
 
 
-def differences(one: Numbers, two: Numbers) -> tuple[Change, ...]:
-    """Return the differences of the numbers of two models, element by element.
-
-    Constants that MuJoCo derives count only if all other numbers are equal.
-    """
-    found: list[Change] = []
-    for section in one:
-        if section != "derived":
-            found += _section(section, one[section], two[section])
-    if found:
-        return tuple(found)
-    return tuple(
-        Change("derived constant", name, fields["values"], two["derived"][name]["values"])
-        for name, fields in one.get("derived", {}).items()
-        if not _equal(fields["values"], two["derived"][name]["values"])
-    )
-
-
-def _section(section: str, before: _Elements, after: _Elements) -> list[Change]:
-    """Return the differences within one section."""
-    found: list[Change] = []
-    fields, scales = (MOVED | SENSED)[section], _scales(before, after)
-    section = {"places": "geoms", "marks": "sites"}.get(section, section)
+def _differences(
+    section: str, fields: dict[str, Field], before: _Elements, after: _Elements
+) -> list[Change]:
+    """Return the differences within one section, element by element."""
+    found, scales = list[Change](), _scales(before, after)
     for element in dict.fromkeys((*before, *after)):
         old, new = before.get(element), after.get(element)
         if old is None or new is None:
-            title, quantity = _TITLES[section], _DESCRIBED_BY.get(section, "type")
+            quantity = _DESCRIBED_BY.get(section, "type")
             there = (old or new or {}).get(quantity, ("there",))
+            ends = (None, there) if old is None else (there, None)
             unit = "kg" if quantity == "mass" else ""
-            one, two = (None, there) if old is None else (there, None)
-            found.append(Change(title, element, one, two, unit))
+            found.append(Change(_TITLES[section], element, *ends, unit))
             continue
         for quantity in dict.fromkeys((*old, *new)):
             if not _equal(old.get(quantity), new.get(quantity), scales[quantity]):
@@ -252,10 +230,9 @@ def _difference(
 def _scales(*sections: _Elements) -> dict[str, float]:
     """Return the largest finite number of each field over the elements of some sections."""
     found: dict[str, float] = {}
-    for section in sections:
-        for fields in section.values():
-            for quantity, values in fields.items():
-                found[quantity] = max(found.get(quantity, 0.0), _largest(values))
+    for fields in (fields for section in sections for fields in section.values()):
+        for quantity, values in fields.items():
+            found[quantity] = max(found.get(quantity, 0.0), _largest(values))
     return found
 
 
@@ -268,14 +245,11 @@ def _equal(before: Values | None, after: Values | None, scale: float = 0.0) -> b
     """Return whether values agree up to rounding; `scale` is the largest of their field."""
     if before == after or before is None or after is None or len(before) != len(after):
         return before == after
+    if any(isinstance(value, str) for value in (*before, *after)):
+        return False
     limit = max(ROUNDING * _largest((*before, *after)), _NOISE * scale)
-
-    def near(old: float | str, new: float | str) -> bool:
-        if isinstance(old, str) or isinstance(new, str):
-            return old == new
-        return old == new or abs(old - new) <= limit or (math.isnan(old) and math.isnan(new))
-
-    return all(map(near, before, after))
+    old, new = np.array(before, float), np.array(after, float)
+    return np.allclose(old, new, rtol=0.0, atol=limit, equal_nan=True)
 
 
 def fingerprint(model: mujoco.MjModel) -> str:
@@ -285,18 +259,26 @@ def fingerprint(model: mujoco.MjModel) -> str:
     differently: numbers count up to rounding. It does not change with colours, cameras, lights, or
     anything else without effect.
     """
-    return _digest_of(moved_numbers(model))
-
-
-def _digest_of(numbers: Numbers) -> str:
-    """Return the first 16 hex digits of the SHA-256 of numbers, which are rounded."""
     rounded: list[object] = []
-    for section, elements in numbers.items():
+    for section, elements in moved_numbers(model).items():
         scales = _scales(elements)
         for element, fields in elements.items():
             row = {name: _rounded(values, scales[name]) for name, values in fields.items()}
             rounded.append((section, element, row))
-    return hashlib.sha256(msgspec.msgpack.encode(rounded)).hexdigest()[:_HEX_DIGITS]
+    return _digest_of(rounded)
+
+
+def fingerprints(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str]:
+    """Return the fingerprints of what decides a model's motion and of what else may be read.
+
+    Cameras, lights and colours are among the latter if `drawn`.
+    """
+    sensed = [_rounded(values, 0.0) for values in sensed_values(model, drawn=drawn)]
+    return fingerprint(model), _digest_of(sensed)
+
+
+def _digest_of(values: object) -> str:
+    return hashlib.sha256(msgspec.msgpack.encode(values)).hexdigest()[:_HEX_DIGITS]
 
 
 def _rounded(values: Values, scale: float) -> Values:
@@ -305,11 +287,6 @@ def _rounded(values: Values, scale: float) -> Values:
     largest = max(_largest(values), _NOISE / 10.0 ** (1 - _ROUNDED_TO) * scale) * (1.0 + ROUNDING)
     places = _ROUNDED_TO - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
     return tuple(
-        value if isinstance(value, str) or not math.isfinite(value) else round(value, places) + 0.0
+        round(value, places) + 0.0 if not isinstance(value, str) and _is_finite(value) else value
         for value in values
     )
-
-
-def fingerprints(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str]:
-    """Return the fingerprints of what decides a model's motion and of what else may be sensed."""
-    return fingerprint(model), _digest_of(sensed_numbers(model, drawn=drawn))

@@ -76,11 +76,7 @@ TABLE: Final[dict[str, Any]] = tomllib.loads(
 )
 MOVED: Final = msgspec.convert(TABLE["moved"], dict[str, dict[str, Field]])
 """Sections of what decides the motion; `derived` constants of `mujoco.mj_setConst` follow them."""
-SENSED: Final = {"places": MOVED["geoms"], "marks": MOVED["sites"]} | msgspec.convert(
-    TABLE["sensed"], dict[str, dict[str, Field]]
-)
-"""Sections of what an env or a task may read besides, the last two where frames are observed."""
-_IN_ORDER: Final = ("joints", "actuators", "sensors", "keyframes")
+_IN_ORDER: Final = ("joints", "actuators")
 
 KINDS: Final = {
     "bodies": ("body", "body", _O.mjOBJ_BODY),
@@ -94,7 +90,6 @@ KINDS: Final = {
     "sensors": ("sensor", "sensor", _O.mjOBJ_SENSOR),
     "keyframes": ("keyframe", "key", _O.mjOBJ_KEY),
     "custom": ("custom number", "numeric", _O.mjOBJ_NUMERIC),
-    "cameras": ("camera", "cam", _O.mjOBJ_CAMERA),
 }
 """What elements with names are called, the first part of the names of their arrays, their type."""
 
@@ -119,8 +114,6 @@ def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
         "eq_kinds": [
             tied.get(mujoco.mjtEq(kind)) or by_type.get(on, "flexes") for kind, on in ties
         ],
-        "sensor_object_kinds": [by_type.get(kind, "") for kind in m.sensor_objtype.tolist()],
-        "sensor_reference_kinds": [by_type.get(kind, "") for kind in m.sensor_reftype.tolist()],
     }
 
 
@@ -318,13 +311,13 @@ def moved_numbers(model: mujoco.MjModel) -> Numbers:
     return found
 
 
-def sensed_numbers(model: mujoco.MjModel, *, drawn: bool) -> Numbers:
-    """Return the readable numbers of a model that do not affect motion; `drawn` for frames."""
+def sensed_values(model: mujoco.MjModel, *, drawn: bool) -> list[Values]:
+    """Return all else that an env may read: names, numbers and digests; `drawn` for frames."""
     reader = _Reader(model)
-    found = {section: reader.section(section) for section in (SENSED if drawn else [*SENSED][:-2])}
+    found = [tuple[float | str, ...](reader.names[kind]) for kind in TABLE["read_by_name"]]
+    found += [_plain(reader.values(Field(name))) for name in TABLE["sensed"]]
     if drawn:
-        digests = {name: _digest(getattr(model, name)) for name in TABLE["drawn"]}
-        found["drawing"] = {name: {"digest": (digest,)} for name, digest in digests.items()}
+        found.append(tuple(_digest(getattr(model, name)) for name in TABLE["drawn"]))
     return found
 
 
@@ -339,8 +332,8 @@ class _Reader:
 
     def section(self, section: str) -> dict[str, dict[str, Values]]:
         """Return the elements of a section that count, with their quantities."""
-        names = self.names.get({"places": "geoms", "marks": "sites"}.get(section, section), [])
-        rows = self.rows((MOVED | SENSED)[section], len(names))
+        names = self.names.get(section, [])
+        rows = self.rows(MOVED[section], len(names))
         kept = self.kept.get(section, [True] * len(names))
         found = {name: row for name, row, keep in zip(names, rows, kept, strict=True) if keep}
         return found if section in _IN_ORDER else dict(sorted(found.items()))
@@ -350,7 +343,7 @@ class _Reader:
         rows: list[dict[str, Values]] = [{} for _ in range(count)]
         for quantity, field in fields.items() if count else ():
             acts = field.where and self._split(field.where, self.array(field.where))
-            for i, values in enumerate(self._split(field.array, self._values(field))):
+            for i, values in enumerate(self._split(field.array, self.values(field))):
                 if not acts or np.any(acts[i]):
                     rows[i][quantity] = _plain(values)
         return rows
@@ -369,7 +362,7 @@ class _Reader:
         first = "jnt_dofadr" if array.startswith("dof_") else TABLE["first_rows"].get(array, "")
         return np.split(values, getattr(self._model, first)[1:]) if first else list(values)
 
-    def _values(self, field: Field) -> Any:
+    def values(self, field: Field) -> Any:
         """Return an array with words for enumerations, and names for indices."""
         values = self.array(field.array)
         if field.of.startswith("mjt"):
