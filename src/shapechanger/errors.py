@@ -37,22 +37,19 @@ class UnknownName(ShapechangerError, ValueError):
     """
 
     def __init__(self, kind: str, name: str, known: Iterable[str], instead: str = "") -> None:
-        self.kind = kind
-        self.name = name
-        self.known = tuple(known)
-        self.instead = instead
-        close = difflib.get_close_matches(name, self.known, n=1)
+        self.kind, self.name, self.known, self.instead = kind, name, tuple(known), instead
+        super().__init__(kind, name, self.known, instead)  # With these it is unpickled.
+
+    def __str__(self) -> str:
+        """Return the message."""
+        close = difflib.get_close_matches(self.name, self.known, n=1)
         hint = f" Did you mean {close[0]!r}?" if close else ""
         # A humanoid has some forty names; a longer list would hide the sentence.
         listed = ", ".join(self.known[:_MOST_NAMES_LISTED]) or "none"
         more = len(self.known) - _MOST_NAMES_LISTED
         listed += f" and {more} more" if more > 0 else ""
-        message = f"No {kind} matches {name!r}.{hint} There are: {listed}."
-        super().__init__(" ".join(filter(None, (message, instead))))
-
-    def __reduce__(self) -> tuple[type[UnknownName], tuple[str, str, tuple[str, ...], str]]:
-        """Pickle the error with its arguments, for worker processes."""
-        return type(self), (self.kind, self.name, self.known, self.instead)
+        message = f"No {self.kind} matches {self.name!r}.{hint} There are: {listed}."
+        return f"{message} {self.instead}".rstrip()
 
 
 class LayoutError(ShapechangerError, ValueError):
@@ -180,16 +177,15 @@ class MissingExtra(ShapechangerError, ImportError):
     """
 
     def __init__(self, package: str, extra: str) -> None:
-        self.package = package
-        self.extra = extra
-        super().__init__(
-            f"This needs {package}, which is not installed: "
-            f"run `pip install 'shapechanger[{extra}]'`."
-        )
+        self.package, self.extra = package, extra
+        super().__init__(package, extra)  # With these it is unpickled.
 
-    def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str]]:
-        """Pickle the error with its two arguments, for worker processes."""
-        return type(self), (self.package, self.extra)
+    def __str__(self) -> str:
+        """Return the message."""
+        return (
+            f"This needs {self.package}, which is not installed: "
+            f"run `pip install 'shapechanger[{self.extra}]'`."
+        )
 
 
 _Error = TypeVar("_Error", bound=Exception)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from shapechanger.layout import Feature, Layout
-from shapechanger.morphology.certificate.certify import compare_rollouts, matched_commands
-from tests.morphology.swing import Broken, Dictionary, Longer, Noisy, Swing
+from shapechanger.morphology.certificate.certify import certify, compare_rollouts, matched_commands
+from tests.morphology.swing import Broken, Dictionary, Longer, Noisy, Swing, Wrapper
 
 
 @pytest.mark.parametrize("wrapped", [lambda env: env, Dictionary, Broken])
@@ -130,3 +130,38 @@ def test_commands_are_in_both_ranges() -> None:
     assert (one.max() <= 1.0, two.min() >= 5.0) == (True, True)
     _, alone = matched_commands(Layout(()), narrow, 3, 0)
     np.testing.assert_array_equal(alone, np.full((3, 1), 0.5, np.float32))
+
+
+class _Late(Wrapper):
+    """Wrapper that adds to the observation after some steps."""
+
+    def __init__(self, env: object, after: int, offset: float) -> None:
+        super().__init__(env)
+        self._left, self._offset = after, offset
+
+    def sensed(self, observation: object) -> object:
+        """Add the offset once the steps are over."""
+        self._left -= 1
+        return observation + (self._offset if self._left < 0 else 0.0)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("after", [0, 1, 50, 100])
+def test_a_late_shift_is_no_rounding(after: int) -> None:
+    """What is sensed may differ late, by little, and between models that round differently."""
+    heavy = Swing(mass=1.0 + 1e-15)
+    assert not certify(heavy, _Late(Swing(), after, 1e-6)).is_empty
+    assert certify(Swing(), _Late(Swing(), after, 1e-12), allow_empty=True).is_empty
+
+
+def test_another_end_of_the_episode_is_no_rounding() -> None:
+    """Equal numbers with another end differ in what the episode is."""
+
+    class _Ends(Wrapper):
+        def step(self, action: object, /) -> object:  # type: ignore[override]
+            observation, reward, _, *rest = self.env.step(action)
+            return (observation, reward, len(self.env.commands) > 30, *rest)
+
+    certificate = certify(Swing(), _Ends(Swing()))
+    assert certificate.same_model
+    assert not certificate.is_empty
+    assert certificate.verdict.endswith("are the same; what is sensed, done or rewarded differs.")

@@ -212,6 +212,13 @@ _UNSEEN: dict[str, Callable[[mujoco.MjModel], object]] = {
     "tendon width": lambda m: m.tendon_width.fill(0.5),
     "softness of friction that is zero": lambda m: m.dof_solimp.__setitem__(-1, 0.7),
     "mass of what cannot move": lambda m: m.body("stand").mass.fill(9.0),
+    "inertia of what cannot move": lambda m: m.body("stand").inertia.fill(9.0),
+    "gravity compensation of what cannot move": lambda m: m.body_gravcomp.__setitem__(
+        m.body("stand").id, 0.5
+    ),
+    "custom number": lambda m: m.numeric_data.fill(9.0),
+    "keyframe": lambda m: m.key_qpos.fill(0.1),
+    "sensor noise": lambda m: m.sensor_noise.fill(0.1),
     "control range without a limit": lambda m: m.actuator("servo").ctrlrange.fill(7.0),
     "bias that the type ignores": lambda m: m.actuator("motor").biasprm.fill(7.0),
     "tendon range without a limit": lambda m: m.tendon_range.__setitem__(1, 7.0),
