@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapechanger.contract.measure import Measure
+from shapechanger.contract.env_ref import Measure
 from shapechanger.envs.own_tasks import RobotState
 
 # A dog in a plane: two legs with a hinge each, of which one is a servo.

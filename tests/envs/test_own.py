@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import shapechanger
-from shapechanger.contract.env_ref import EnvRef, env_traits
-from shapechanger.contract.measure import FORWARD_SPEED, RETURN
+from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN, EnvRef, env_traits
 from shapechanger.errors import (
     BrokenModel,
     EmptyShift,

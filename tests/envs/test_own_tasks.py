@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shapechanger.contract.measure import FORWARD_SPEED
+from shapechanger.contract.env_ref import FORWARD_SPEED
 from shapechanger.envs.own_tasks import (
     RobotState,
     Walk,

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import shapechanger  # noqa: F401  # Registers the ids.
-from shapechanger.contract.env_ref import EnvRef, measures_of
-from shapechanger.contract.measure import FORWARD_SPEED
+from shapechanger.contract.env_ref import FORWARD_SPEED, EnvRef, measures_of
 from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.envs.naming import default_learner
 from shapechanger.errors import UnknownName

@@ -23,7 +23,7 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.contract.measure import FORWARD_SPEED, RETURN
+from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN
 from shapechanger.envs.checks import check_action
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
 from shapechanger.envs.odrl import published

@@ -33,7 +33,7 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.contract.measure import RETURN, Measure
+from shapechanger.contract.env_ref import RETURN, Measure
 from shapechanger.envs.catalogue import MODEL_FILES, OWN_ROBOT
 from shapechanger.envs.checks import check_action
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features

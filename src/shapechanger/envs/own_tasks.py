@@ -23,7 +23,7 @@ from typing import Any, ClassVar, Final, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.measure import FORWARD_SPEED, RETURN, Measure
+from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN, Measure
 from shapechanger.errors import TaskError, UnknownName
 
 _Floats = NDArray[np.float64]
@@ -85,7 +85,7 @@ class OwnTask(Protocol):
     - `observe`: names or globs of the numbers to observe, such as `("*/angle", "*/contact/*")`; by
       default all positions and velocities, except the position on the floor.
     - `terminated(robot)`: whether the episode ends; by default never.
-    - `measures`: metrics of a policy (`shapechanger.contract.measure`), the default first.
+    - `measures`: metrics of a policy (`shapechanger.contract.env_ref`), the default first.
     - `check(robot)`: called once with the robot at its start; raises `TaskError` if the robot does
       not fit.
     """

@@ -25,7 +25,7 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.contract.measure import FORWARD_SPEED, RETURN, Measure
+from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN, Measure
 from shapechanger.envs.layouts import position_features, velocity_features
 from shapechanger.envs.odrl import published
 from shapechanger.envs.reshapable import Reshapable

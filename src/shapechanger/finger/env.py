@@ -14,7 +14,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.contract.measure import Measure
+from shapechanger.contract.env_ref import Measure
 from shapechanger.envs.checks import check_action
 from shapechanger.envs.opengl import choose_gl, require_screen
 from shapechanger.envs.renderer import Renderer, body_reach, draw

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.contract.measure import RETURN, SUCCESS
+from shapechanger.contract.env_ref import RETURN, SUCCESS
 from shapechanger.errors import FingerError
 from shapechanger.finger.env import SMOOTHNESS, FingerEnv
 from shapechanger.finger.parameters import as_numbers

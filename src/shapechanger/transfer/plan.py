@@ -9,8 +9,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-from shapechanger.contract.env_ref import EnvRef
-from shapechanger.contract.measure import RETURN
+from shapechanger.contract.env_ref import RETURN, EnvRef
 from shapechanger.errors import StudyError, UnknownName, check_seed
 from shapechanger.files import read_json
 from shapechanger.identity import Identity

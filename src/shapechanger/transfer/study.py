@@ -15,13 +15,14 @@ import msgspec
 import numpy as np
 
 from shapechanger.contract.env_ref import (
+    RETURN,
     EnvRef,
     EnvTraits,
+    Measure,
     certify_shift,
     env_traits,
     is_reward_term,
 )
-from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.errors import ForeignStudy, SpaceMismatch, StudyError, UnknownName
 from shapechanger.files import make_folder, read_json, write_json
 from shapechanger.transfer.body_map import BodyMap

@@ -15,7 +15,7 @@ from typing import Final
 
 import msgspec
 
-from shapechanger.contract.measure import RETURN
+from shapechanger.contract.env_ref import RETURN
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
 from shapechanger.files import make_folder
 from shapechanger.transfer.metrics.curves import LearningCurves

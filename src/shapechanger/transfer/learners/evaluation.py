@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import (
+    RETURN,
     EnvRef,
+    Measure,
     hold_out,
     is_reward_term,
     is_single_instance,
     measures_of,
 )
-from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.errors import UnknownName
 
 EVALUATION_SEED: Final = 10_000_000
