@@ -6,17 +6,17 @@ import getpass
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import tyro
+from rich.prompt import Prompt
 
-from shapechanger.cli.console import say
-from shapechanger.errors import MissingExtra, RobotError, ShapechangerError, UnknownName
+from shapechanger.cli.console import plain_console, say
+from shapechanger.errors import MissingExtra, RobotError, UnknownName
 from shapechanger.robot.check.pins import require_pins
 from shapechanger.robot.client.known_robots import check_name, console_address, remember
 from shapechanger.robot.daemon.credentials import (
@@ -83,50 +83,47 @@ class RobotInit:
 
     def _ask(self) -> None:
         """Ask for all settings, each with a default, write the files, and install them on a Pi."""
-        kinds = shipped_profiles()
+        console, kinds = plain_console(), shipped_profiles()
         say("Kinds of robot:")
         for kind, path in kinds.items():
             say(f"  {kind:10}  {_first_sentence(path)}")
-        say("Enter takes the answer in brackets.")
-        kind = _answer("Kind of robot", "car", _one_of(kinds, "kind of robot"))
-        stated = load_profile(kinds[kind])
 
-        def free(name: str) -> str:
-            RobotInit(kind, name)._checked()
-            return name
+        def ask(question: str, default: str, *choices: str) -> str:
+            return Prompt.ask(
+                question, console=console, choices=[*choices] or None, default=default
+            )
 
-        name = _answer("Its name", kind, free)
-        has = "none" if stated.camera is None else "ribbon"
-        question = "Camera (ribbon: the Pi's own cable, usb: a webcam, none)"
-        camera = _answer(question, has, _one_of(("ribbon", "usb", "none"), "camera"))
-        question = "Who may arm it, so that it can move (person; anyone: programs, too)"
-        arming = _answer(question, stated.arming, _one_of(("person", "anyone"), "answer"))
         try:
-            Machine("").require_pi()
-        except RobotError:
-            installs = "no"
-        else:
-            question = "Install it now, with sudo, to start with the computer (yes, no)"
-            installs = _answer(question, "yes", _one_of(("yes", "no"), "answer"))
+            kind = ask("Kind of robot", "car", *kinds)
+            stated = load_profile(kinds[kind])
+            name = ask("Its name", kind)
+            has = "none" if stated.camera is None else "ribbon"
+            question = "Camera (ribbon: the Pi's own cable, usb: a webcam)"
+            camera = ask(question, has, "ribbon", "usb", "none")
+            question = "Who may arm it, so that it can move (anyone: programs, too)"
+            arming = ask(question, stated.arming, "person", "anyone")
+            installs = False
+            with suppress(RobotError):
+                Machine("").require_pi()
+                question = "Install it now, with sudo, to start with the computer"
+                installs = ask(question, "yes", "yes", "no") == "yes"
+        except EOFError:
+            raise RobotError("No more answers: nothing was written.") from None
         chosen: Any = {
             "camera": "" if camera == has else camera,
             "arming": "" if arming == stated.arming else arming,
         }
-        made = RobotInit(kind, name, **chosen)._write(installs=installs == "yes")
-        if installs == "yes":
+        made = RobotInit(kind, name, **chosen)._write(installs=installs)
+        if installs:
             say("")
             RobotInstall(str(made)).run()
 
-    def _checked(self) -> tuple[str, Path]:
-        """Return name and file of the profile, after all checks."""
+    def _write(self, *, installs: bool = False) -> Path:
         name = self.name or self.kind
         check_name(name)
         out = self.out or Path(f"{name}.toml")
+        # Check everything before creating anything.
         starter_text(self.kind, out, name, self.camera, self.arming)
-        return name, out
-
-    def _write(self, *, installs: bool = False) -> Path:
-        name, out = self._checked()  # Check everything before creating anything.
         credentials = make_credentials(self.credentials or credentials_folder(name), name)
         # Lets clients on this machine drive the robot, especially a twin.
         remember(robot_at("127.0.0.1", name, credentials))
@@ -212,32 +209,6 @@ def _first_sentence(profile: Path) -> str:
     """Return the first sentence of the comment at the head of a shipped profile."""
     lines = takewhile(lambda line: line.startswith("#"), profile_text(profile).splitlines())
     return " ".join(line.lstrip("# ") for line in lines).partition(". ")[0].rstrip(".")
-
-
-def _one_of(options: Iterable[str], kind: str) -> Callable[[str], str]:
-    """Return a check that accepts an option in any case, or an unambiguous prefix of one."""
-
-    def check(answer: str) -> str:
-        word = answer.lower()
-        starts = [option for option in options if option.startswith(word)]
-        if word not in options and len(starts) != 1:
-            raise UnknownName(kind, answer, options)
-        return word if word in options else starts[0]
-
-    return check
-
-
-def _answer(question: str, default: str, check: Callable[[str], str]) -> str:
-    while True:
-        try:
-            answer = input(f"{question} [{default}]: ").strip() or default
-        except EOFError:
-            say("")
-            raise RobotError("No more answers: nothing was written.") from None
-        try:
-            return check(answer)
-        except ShapechangerError as error:
-            say(str(error))
 
 
 def own_profile(name: str) -> Path:
