@@ -38,11 +38,11 @@ from shapechanger.robot.guard.outputs import OutputBank
 from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.install import (
-    FAST_HZ,
     Machine,
     device_groups,
     has_ribbon,
     servo_devices,
+    settings_of_computer,
     unit_name,
     unit_word,
 )
@@ -137,31 +137,20 @@ def _computer(robot: StandingRobot) -> Checks:
     model = ("good", f"{machine.model}.")
     other = "This is not a Raspberry Pi: `serve --twin` runs on simulated pins here."
     yield "computer", [model if machine.model else ("unknown", other)]
-
-    def setting(parameter: str, is_set: bool, good: str, bad: str) -> Result:
-        if machine.config is None:
-            return "unknown", f"This machine has no config.txt, which sets {parameter} on a Pi."
-        remedy = f"add `dtparam={parameter}` to {machine.config} and restart the computer"
-        return judged(is_set, f"{machine.config} sets it: {good}.", f"{bad}: {remedy}.")
-
-    good = "the pins of a process that dies go low"
-    bad = "A pin keeps its level when the process that set it dies"
-    is_strict = machine.sets("strict_gpiod")
-    yield "strict_gpiod", [setting("strict_gpiod", is_strict, good, bad)]
+    for change in settings_of_computer(profile, machine):
+        level = "good" if change.is_made() else "bad" if machine.config else "unknown"
+        remedy = f"Not so: {change.state} `shapechanger robot install {profile.path}` sees to it."
+        otherwise = remedy if change.commands else change.instead
+        yield change.name, [(level, change.state if level == "good" else otherwise)]
     yield "enable line", [_enable_line(profile)]
     if any(settings["output_enable"] == -1 for settings in _boards(profile)):
         reason = "A PCA9685 without output_enable keeps its last pulse: wire OE to a pin with "
         yield "output enable", [("bad", reason + "a pull-up and name it as output_enable.")]
-    yield "latency timer", _latency_timers(robot)
     yield "devices", _devices(robot)
     yield "packages", _packages(profile)
     if (camera := profile.camera) is not None:
         yield "camera", _camera(camera)
         yield "camera's geometry", [_geometry(camera)]
-    if any(sensor.driver == "as5600" for sensor in profile.sensors):
-        good, is_fast = f"{machine.i2c_hz()} bits per second", machine.i2c_hz() >= FAST_HZ
-        bad = "Four encoders take 3 of every 10 ms at the default of 100000 bits per second"
-        yield "I2C speed", [setting(f"i2c_arm_baudrate={FAST_HZ}", is_fast, good, bad)]
 
 
 def _wiring(robot: StandingRobot) -> Checks:
@@ -198,19 +187,20 @@ def _unit(robot: StandingRobot) -> Results:
     profile = robot.profile.path.absolute()
     path = robot.root / "etc/systemd/system" / unit_name(robot.profile.name)
     remedy = f"`shapechanger robot install {profile}` puts it there"
-    if not path.exists():
-        reason = "so after a crash nothing restarts the robot or makes its pins safe"
-        yield "bad", f"{path} does not exist, {reason}: {remedy}."
-        return
-    text, word = path.read_text(), unit_word(str(profile))
-    needed = ["Restart=always", f"ExecStart=…robot serve {word}"]
-    needed.append(f"ExecStopPost=…robot safe-pins {word}")
+    word = unit_word(str(profile))
+    needed = [
+        "Restart=always",
+        f"ExecStart=…robot serve {word}",
+        f"ExecStopPost=…robot safe-pins {word}",
+    ]
+    text = path.read_text() if path.exists() else ""
     patterns = {one: re.escape(one).replace("…", ".*") for one in needed}
     lacks = [one for one in needed if not re.search(rf"(?m)^{patterns[one]}(\s|$)", text)]
     yield judged(
         not lacks,
         f"{path} restarts the robot and makes its pins safe.",
-        f"{path} lacks {' and '.join(lacks)}, so it is old or for another profile: {remedy}.",
+        f"{path} is missing, old or for another profile, because it lacks {' and '.join(lacks)}: "
+        f"{remedy}.",
     )
 
 
@@ -226,35 +216,14 @@ def _enable_line(guard: GuardPlan) -> Result:
     )
 
 
-def _latency_timers(robot: StandingRobot) -> Results:
-    """Check that the USB adapters forward the servos' answers without delay."""
-    for device in servo_devices(robot.profile):
-        path = robot.root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
-        if not path.exists():
-            yield "unknown", f"{device} reports no latency timer; if it has one, it must be 1 ms."
-            continue
-        ms = path.read_text().strip()
-        yield judged(
-            ms == "1",
-            f"The latency timer of {device} is 1 ms.",
-            f"The adapter at {device} delays the servos' answers by {ms} ms: "
-            f"`echo 1 | sudo tee {path}`.",
-        )
-
-
-# Remedies for device files that do not exist, keyed by the group of the file.
-_WITHOUT_DEVICE: Final = {
-    "gpio": "only a computer with GPIO pins, such as a Raspberry Pi, drives this robot",
-    "i2c": "switch the bus on with `sudo raspi-config` (Interface Options), and restart",
-    "dialout": "plug in the adapter of the servo bus",
-}
-
-
 def _devices(robot: StandingRobot) -> Results:
     for name, group in device_groups(robot.profile).items():
         path = robot.root / name.lstrip("/")
         if not path.exists():
-            yield "bad", f"{path} does not exist: {_WITHOUT_DEVICE[group]}."
+            yield (
+                "bad",
+                f"{path} does not exist: a Raspberry Pi has it once the robot is installed.",
+            )
             continue
         remedy = f"`sudo adduser $USER {group}` and log in again"
         otherwise = f"This user may not open {path}: {remedy}."

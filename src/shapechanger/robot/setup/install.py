@@ -26,9 +26,7 @@ from shapechanger.files import cannot_write, write_new
 from shapechanger.robot.drivers.servos.settings import DRIVER
 from shapechanger.robot.profile.profile import Profile
 
-FAST_HZ: Final = 400_000
-"""Speed of the I2C bus that encoders at joints need, bits per second."""
-
+_FAST_HZ: Final = 400_000  # Speed of the I2C bus that encoders at joints need, bits per second.
 _ARM_BUS: Final = 1  # The I2C bus of the header's pins 3 and 5.
 _UARTS: Final = ("serial", "ttyAMA", "ttyS")  # Serial ports of the header.
 _UNITS: Final = "etc/systemd/system"
@@ -50,7 +48,9 @@ def _text(path: Path | None) -> str:
 def needs_pins(guard: GuardPlan) -> bool:
     """Return True if a robot needs its computer's own pins, to move or to stop."""
     return guard.enable_pin is not None or any(
-        output.driver in {"hbridge", "phase_enable"} or output.settings.get("over") == "lgpio"
+        output.driver in {"hbridge", "phase_enable"}
+        or output.settings.get("over") == "lgpio"
+        or output.settings.get("output_enable", -1) >= 0
         for output in guard.outputs
     )
 
@@ -306,26 +306,10 @@ def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterat
 
     Each change is planned when those before are made.
     """
-    root = machine.root
     groups = {*device_groups(profile).values(), *(["video"] if profile.camera else [])}
     yield from (_group(group, machine) for group in sorted(groups))
-    yield from _interfaces(profile, machine)
-    if has_ribbon(profile):
-        package = root / "usr/lib/python3/dist-packages/picamera2"
-        install = _root("apt-get install -y python3-picamera2")
-        state = "python3-picamera2 is installed."
-        yield SystemChange("picamera2", state, package.is_dir, (install,))
-    rule, path, wanted = root / _UDEV, root / _UNITS / unit.name, root / _WANTED / unit.name
-    for device in servo_devices(profile):
-        if Path(device).name.startswith(_UARTS):
-            yield _serial_port(device, machine)
-        else:
-            yield SystemChange(
-                "latency timer",
-                "USB adapters that are plugged in from now on pass on answers within 1 ms.",
-                lambda: _text(rule) == _LATENCY,
-                (_root("tee", rule, text=_LATENCY), _root("udevadm control --reload")),
-            )
+    yield from settings_of_computer(profile, machine)
+    path, wanted = machine.root / _UNITS / unit.name, machine.root / _WANTED / unit.name
     yield SystemChange(
         "service",
         f"{path} is the unit next to the profile, and starts with the computer, not armed.",
@@ -358,8 +342,8 @@ def _group(group: str, machine: Machine) -> SystemChange:
     )
 
 
-def _interfaces(profile: Profile, machine: Machine) -> Iterator[SystemChange]:
-    """Yield the changes of config.txt."""
+def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemChange]:
+    """Yield the settings of the computer that a robot needs, whoever runs it."""
 
     def line(
         name: str, state: str, text: str, is_made: Callable[[], bool], *more: RootCommand
@@ -388,11 +372,26 @@ def _interfaces(profile: Profile, machine: Machine) -> Iterator[SystemChange]:
             reason = f"Bus {bus} needs an overlay that depends on its pins, as dtoverlay=i2c{bus}."
             yield SystemChange(f"I2C bus {bus}", state, exists, instead=reason)
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
-        state, text = f"The I2C bus has {FAST_HZ} bits per second.", f"i2c_arm_baudrate={FAST_HZ}"
-        yield line("I2C speed", state, f"dtparam={text}", lambda: machine.i2c_hz() >= FAST_HZ)
+        state, text = f"The I2C bus has {_FAST_HZ} bits per second.", f"i2c_arm_baudrate={_FAST_HZ}"
+        yield line("I2C speed", state, f"dtparam={text}", lambda: machine.i2c_hz() >= _FAST_HZ)
     if has_ribbon(profile):
         state = "The camera on the ribbon cable is detected."
-        yield line("camera", state, "camera_auto_detect=1", machine.finds_camera)
+        yield line("camera detection", state, "camera_auto_detect=1", machine.finds_camera)
+        package = machine.root / "usr/lib/python3/dist-packages/picamera2"
+        install = _root("apt-get install -y python3-picamera2")
+        state = "python3-picamera2 is installed."
+        yield SystemChange("picamera2", state, package.is_dir, (install,))
+    rule = machine.root / _UDEV
+    for device in servo_devices(profile):
+        if Path(device).name.startswith(_UARTS):
+            yield _serial_port(device, machine)
+        else:
+            yield SystemChange(
+                "latency timer",
+                "USB adapters that are plugged in from now on pass on answers within 1 ms.",
+                lambda: _text(rule) == _LATENCY,
+                (_root("tee", rule, text=_LATENCY), _root("udevadm control --reload")),
+            )
 
 
 def _serial_port(device: str, machine: Machine) -> SystemChange:
