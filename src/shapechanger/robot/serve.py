@@ -110,9 +110,7 @@ class Service:
             one_shot_ms=float(wiring.enable_hold_ms),
             place=place(),
         )
-        undo.enter_context(started)
-        started.owner.set_inheritable(True)  # The board outlives this process's `exec`.
-        return started
+        return undo.enter_context(started)
 
     def plan(self, profile: Profile, board: BoardAt | None) -> ServePlan:
         """Return the plan for the robot's processes; `board` is the twin's, None on hardware."""

@@ -264,9 +264,9 @@ def test_a_broken_file_of_a_known_robot_is_skipped(
 
 def test_questions_are_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only yes, no and the end of the input are answers."""
-    answers = iter(["", "maybe", "Y", "no"])
+    answers = iter(["", "maybe", "Y", "n"])
 
-    def answer(_: str) -> str:
+    def answer() -> str:
         try:
             return next(answers)
         except StopIteration:

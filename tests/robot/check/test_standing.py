@@ -148,7 +148,7 @@ def freed() -> Iterator[threading.Event]:
 @pytest.mark.parametrize(
     ("error", "text"),
     [
-        (None, "No answer within|no frame within"),
+        (None, "No answer within"),
         (RobotError("It burns."), r"^It burns\.|: It burns\."),
         (ValueError("Odd."), "Odd"),
     ],
@@ -163,8 +163,7 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
     text: str,
 ) -> None:
     """Each check has a deadline, its failure is a finding, and all others are made."""
-    for name in ("CHECK_S", "_CAMERA_S"):
-        monkeypatch.setattr(standing, name, 0.05 if error is None else 5.0)
+    monkeypatch.setattr(standing, "CHECK_S", 0.05 if error is None else 5.0)
     for name in ("dev/gpiochip0", "dev/i2c-1"):
         _write(tmp_path, name)
     profile = replace(car, camera=CameraPlan("pattern"), outputs=(*car.outputs, _SERVO))

@@ -8,8 +8,8 @@ from typing import Any, Final, Self
 import msgspec
 from playwright.sync_api import Browser, Page, TimeoutError
 
+from shapechanger.robot.twin.ledger import Transition
 from shapechanger.robot.twin.robot import RunningRobot
-from shapechanger.robot.twin.signals import Transition
 from tests.robot.twin.robots import until
 
 DESK: Final[dict[str, Any]] = {"viewport": {"width": 1280, "height": 800}}

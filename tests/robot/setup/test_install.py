@@ -79,12 +79,12 @@ def test_what_fails_is_told_with_its_command(
     pi.refuses = "usermod"
     found = _install(pi, _blind("car"))
     sentence = "usermod: permission denied. By hand: sudo usermod -aG gpio pi"
-    assert (found["group gpio"], found["service"][0]) == (("failed", sentence), "did")
+    assert (found["group gpio"], found["service"][0]) == (("FAILED", sentence), "did")
     other = FakePi(tmp_path / "other", config=None, groups=())
     monkeypatch.setattr(other, "run", lambda _: "")
     found = _install(other, shipped("car"))
     sentence = "There is no group gpio here, which Raspberry Pi OS has."
-    assert found["group gpio"] == ("failed", sentence)
+    assert found["group gpio"] == ("FAILED", sentence)
     for part in ("no config.txt", "dtparam=strict_gpiod"):
         assert part in found["strict_gpiod"][1]
     assert "the command had no effect" in found["service"][1]

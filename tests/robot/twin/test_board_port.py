@@ -13,7 +13,7 @@ from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.hardware import TwinHardware, connect
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.start import RunningBoard, start_board
+from shapechanger.robot.twin.start import BoardAt, start_board
 
 pytestmark = pytest.mark.realtime
 
@@ -22,7 +22,7 @@ _PULL = (0.5, *(0.0,) * 6)
 
 
 @pytest.fixture(scope="module")
-def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningBoard]:
+def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BoardAt]:
     """A finger on the twin's clock."""
     place = finger_place(NOMINAL)
     with start_board(_PLAN, "twin", tmp_path_factory.mktemp("board"), place=place) as started:
@@ -30,7 +30,7 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningBoard]:
 
 
 @pytest.fixture
-def hardware(board: RunningBoard) -> Iterator[TwinHardware]:
+def hardware(board: BoardAt) -> Iterator[TwinHardware]:
     """Hardware of a guard connected to the board."""
     made = connect(board.socket_path)
     yield made
@@ -38,7 +38,7 @@ def hardware(board: RunningBoard) -> Iterator[TwinHardware]:
 
 
 def test_outputs_set_tensions_that_the_sensors_report(
-    board: RunningBoard, hardware: TwinHardware
+    board: BoardAt, hardware: TwinHardware
 ) -> None:
     """Commanded tensions appear in the readings, and a servo's fault as a failure."""
     outputs, sensors = OutputBank(_PLAN, hardware), Sensors(_PLAN, hardware)
@@ -63,7 +63,7 @@ def test_outputs_set_tensions_that_the_sensors_report(
     assert outputs.close(0) == []
 
 
-def test_make_safe_sends_nothing_to_servos(board: RunningBoard, hardware: TwinHardware) -> None:
+def test_make_safe_sends_nothing_to_servos(board: BoardAt, hardware: TwinHardware) -> None:
     """`make_safe` sends no packets to servos, so that their watchdogs can expire."""
     outputs = OutputBank(_PLAN, hardware)
     with Operator(board.socket_path) as operator:

@@ -14,9 +14,9 @@ import simplejpeg
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.twin.ledger import read_ledger
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.signals import read_ledger
-from shapechanger.robot.twin.start import RunningBoard, start_board
+from shapechanger.robot.twin.start import BoardAt, start_board
 from shapechanger.vehicles.twin import course_place
 from tests.robot.cameras.frames import read_barcode
 from tests.robot.twin.robots import CAR, until
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.realtime
 _CAMERA = CameraPlan("pipe", fps=20.0)
 
 
-def _open(board: RunningBoard) -> BinaryIO:
+def _open(board: BoardAt) -> BinaryIO:
     return os.fdopen(os.open(board.fifo_path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0)
 
 
@@ -138,6 +138,10 @@ def test_an_invalid_operator_request_keeps_the_board_running(tmp_path: Path) -> 
 def test_a_board_that_fails_to_start_prints_the_reason(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(RobotError, match="did not start"):
-        start_board(CAR, "twin", tmp_path, place=course_place("corridor", "tank"))
+    place = course_place("corridor", "tank")
+    with (
+        pytest.raises(RobotError, match="did not start"),
+        start_board(CAR, "twin", tmp_path, place=place),
+    ):
+        pass
     assert "a tank is driven by 'left track' and 'right track'" in capfd.readouterr().err

@@ -84,11 +84,9 @@ def test_in_real_time_the_clock_runs_by_itself(tmp_path: Path) -> None:
 
 
 def test_using_a_closed_board_raises(tmp_path: Path) -> None:
-    board = start_board(CAR, "twin", tmp_path)
-    hardware = connect(board.socket_path)
+    with start_board(CAR, "twin", tmp_path) as board:
+        hardware = connect(board.socket_path)
     clock = hardware.clock
-    board.close()
-    assert board.process.returncode == 0
     with pytest.raises(RobotError, match="board has ended"):
         clock.wait([], 2**62, 1.0)
     with pytest.raises(RobotError, match="board has ended"):

@@ -9,10 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.twin.judge import propelled, time_to_rest, unauthorised
+from shapechanger.robot.twin.ledger import (
+    Transition,
+    propelled,
+    read_ledger,
+    time_to_rest,
+    unauthorised,
+)
 from shapechanger.robot.twin.pin_board import PinBoard
 from shapechanger.robot.twin.room import DrivingWorld
-from shapechanger.robot.twin.signals import Transition, read_ledger
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc
 

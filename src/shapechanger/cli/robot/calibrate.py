@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -61,7 +61,7 @@ class RobotCalibrate:
         if not (self.twin or self.wheels_up):
             ask_for_wheels_up()
         with Terminal() as terminal:
-            calibration = Calibration(profile, terminal, self.cap, twin=self.twin)
+            calibration = Calibration(profile, terminal, self.cap, self.twin)
             try:
                 calibration.run()
             except ShapechangerError:
@@ -91,18 +91,15 @@ class _Ended(Exception):
     """The person quits."""
 
 
+@dataclass
 class Calibration:
-    """Calibration of all outputs and encoders of a robot, with the results in `found`.
+    """Calibration of all outputs and encoders of a robot, with the results in `found`."""
 
-    `cap` limits motors, and ESCs unless the person chooses to exceed it.
-    """
-
-    def __init__(self, profile: Profile, keys: Terminal, cap: float, *, twin: bool) -> None:
-        self._profile = profile
-        self._keys = keys
-        self._cap = cap
-        self._twin = twin
-        self.found: dict[str, Any] = {}
+    profile: Profile
+    keys: Terminal
+    cap: float  # Limits motors, and ESCs unless the person chooses to exceed it.
+    twin: bool
+    found: dict[str, Any] = field(default_factory=dict[str, Any])
 
     def run(self) -> None:
         """Calibrate everything; `found` is empty if the person quits."""
@@ -111,12 +108,12 @@ class Calibration:
             "Q ends without writing, Space and Escape stop everything and end."
         )
         try:
-            for output in self._profile.outputs:
+            for output in self.profile.outputs:
                 if output.mix and OUTPUTS[output.driver].pulses:
                     self.found |= self._pulses(output)
                 elif output.mix and output.driver in {"hbridge", "phase_enable"}:
                     self.found |= self._motor(output)
-            for sensor in self._profile.sensors:
+            for sensor in self.profile.sensors:
                 if sensor.driver == "encoder":
                     self.found |= self._wheel(sensor.name, sensor.settings["wheel_m"])
         except _Ended:
@@ -134,7 +131,7 @@ class Calibration:
             {f"output.{output.name}.{key}": us for key, us in widest.items()}
         ) as robot:
             # Servo ends are searched for; an ESC's end is full speed.
-            cap = self._cap if output.driver == "esc" else 1.0
+            cap = self.cap if output.driver == "esc" else 1.0
             for name in names:
                 say(f"  … {name}")
                 value = self._jogged(robot, wide, cap, goes_beyond=True)
@@ -146,7 +143,7 @@ class Calibration:
     def _motor(self, output: OutputPlan) -> dict[str, Any]:
         say(f"\n{output.name}: D raises its duty; Enter when it begins to move …")
         with self._served({f"output.{output.name}.start": 0.0}) as robot:
-            value = self._jogged(robot, output, self._cap, _START_STEP)
+            value = self._jogged(robot, output, self.cap, _START_STEP)
         if not value:
             return {}
         say("  … did it go forward, or right? Y or N")
@@ -187,7 +184,7 @@ class Calibration:
         A key press changes the command by `step`, to at most `cap`; with `goes_beyond`, Y lifts the
         cap.
         """
-        actions, outputs = self._profile.actions, self._profile.outputs
+        actions, outputs = self.profile.actions, self.profile.outputs
         index = [one.name for one in outputs].index(output.name)
         # The action with the largest weight on this output.
         name = max(output.mix, key=lambda action: abs(output.mix[action]))
@@ -203,7 +200,7 @@ class Calibration:
             while True:
                 if not seen.armed:
                     raise RobotError(f"The robot stopped: {seen.stop_reason}")
-                applied = output_values(self._profile, seen.action_applied)[index]
+                applied = output_values(self.profile, seen.action_applied)[index]
                 live.update(Text(f"  {reading(output, applied)}"))
                 sent = robot.command(values, answers=seen.seq)
                 if accepted is None:
@@ -233,7 +230,7 @@ class Calibration:
 
     def _pressed(self, wait_s: float = 0.0, robot: RobotClient | None = None) -> Iterator[str]:
         """Yield the pressed keys; Q quits, and Space and Escape stop the robot and quit."""
-        for key in self._keys.keys(wait_s):
+        for key in self.keys.keys(wait_s):
             if key in STOPS and robot is not None:
                 robot.emergency_stop("calibrate")
                 looks = 0
@@ -248,12 +245,12 @@ class Calibration:
         """Serve the robot with other settings, armed for a person."""
         with tempfile.TemporaryDirectory(prefix="shapechanger-calibrate-") as folder:
             path = Path(folder, "profile.toml")
-            path.write_bytes(self._profile.path.read_bytes())
+            path.write_bytes(self.profile.path.read_bytes())
             profile = rewrite(path, settings) if settings else load_profile(path)
             # Calibration needs neither the camera, which may be missing, nor a course.
-            arguments = ("--world", "room") if self._twin else ()
+            arguments = ("--world", "room") if self.twin else ()
             with (
-                run_robot(profile, twin=self._twin, arguments=arguments) as robot,
+                run_robot(profile, twin=self.twin, arguments=arguments) as robot,
                 robot.client(role="person", frames=False, name="calibrate") as client,
             ):
                 client.take()

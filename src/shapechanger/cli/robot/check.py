@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import platform
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 import tyro
+from rich.prompt import Confirm
 
-from shapechanger.cli.console import say
+from shapechanger.cli.console import plain_console, say
 from shapechanger.cli.robot.calibrate import ask_for_wheels_up
 from shapechanger.cli.robot.setup import require_port
 from shapechanger.errors import RobotError
@@ -91,7 +93,7 @@ class RobotCheck:
             # The driver that faults befall is a program.
             arguments=("--arm-by-program",) if self.leds and not on_twin else (),
             pilot=_PILOT,
-            ask=ask_person if asks else ask_nobody,
+            ask=ask_person if asks else lambda _: None,
         )
         require_level(level, bench)
         if not on_twin and not self.wiring:
@@ -162,17 +164,8 @@ class RobotCheck:
             raise RobotError("Nothing was lit.")
 
 
-def ask_nobody(_: str) -> None:
-    """Return no answer; see `Ask`."""
-
-
 def ask_person(question: str) -> bool | None:
     """Ask until the answer is yes or no; see `Ask`."""
-    while True:
-        try:
-            answer = input(f"{question} [y/n] ").strip().lower()
-        except EOFError:
-            return None
-        if answer in {"y", "yes", "n", "no"}:
-            return answer.startswith("y")
-        say("Answer y or n.")
+    with suppress(EOFError):
+        return Confirm.ask(question, console=plain_console())
+    return None

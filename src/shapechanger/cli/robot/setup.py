@@ -42,7 +42,6 @@ from shapechanger.robot.serve import robot_at
 from shapechanger.robot.setup.calibration import find_joint_zeros, find_zeros
 from shapechanger.robot.setup.install import (
     Machine,
-    Outcome,
     changes_to_install,
     changes_to_remove,
     make_changes,
@@ -258,12 +257,6 @@ class RobotHome:
         change_profile(path, found)
 
 
-_AFTERWARDS = {
-    "restart": "Restart the computer, which sets up groups, pins and buses: sudo reboot",
-    "log in": "Log out and in again, so that this user has the new groups.",
-}
-
-
 @dataclass(frozen=True)
 class RobotInstall:
     """Put a robot's service, groups, buses and camera in place on a Raspberry Pi."""
@@ -297,18 +290,15 @@ class RobotInstall:
             load_credentials(folder)
             unit = self._unit(profile, machine.user)
             changes = changes_to_install(profile, unit, machine)
-        outcomes: list[Outcome] = []
-        for outcome in make_changes(changes, machine.run, dry=self.dry_run):
-            level = "FAILED" if outcome.level == "failed" else outcome.level
-            say(f"{level:7}  {outcome.change.name}: {outcome.sentence}")
-            outcomes.append(outcome)
-        then = {outcome.change.then for outcome in outcomes if outcome.level in {"did", "would"}}
-        # A restart logs the user in again, too.
-        for each in sorted(then - {"", "log in"} or then - {""}):
-            say(_AFTERWARDS[each])
-        failed = sum(outcome.level == "failed" for outcome in outcomes)
+        restarts, failed = False, 0
+        for change, level, sentence in make_changes(changes, machine.run, dry=self.dry_run):
+            say(f"{level:7}  {change.name}: {sentence}")
+            restarts |= change.restarts and level in {"did", "would"}
+            failed += level == "FAILED"
+        if restarts:
+            say("Restart the computer, which sets up groups, pins and buses: sudo reboot")
         if failed:
-            say(f"\n{failed} of {len(outcomes)} could not be done.")
+            say(f"\n{failed} could not be done.")
             sys.exit(1)
         if not (self.remove or self.dry_run):
             unit = unit_name(profile.name).removesuffix(".service")

@@ -126,21 +126,13 @@ Ask = Callable[[str], bool | None]
 
 
 class BenchLamp(NamedTuple):
-    """An LED instead of a motor or servo.
+    """An LED instead of a motor or servo."""
 
-    Attributes:
-        name: Its output and direction, such as "drive forward".
-        place: Its pin or channel, such as "GPIO22".
-        output: The output; None for the enable line.
-        value: Value of the output at which it is lit.
-        pin: Its BCM pin; None on a PWM chip.
-    """
-
-    name: str
-    place: str
-    output: OutputPlan | None
-    value: float
-    pin: int | None
+    name: str  # Its output and direction, such as "drive forward".
+    place: str  # Its pin or channel, such as "GPIO22".
+    output: OutputPlan | None  # None for the enable line.
+    value: float  # Value of the output at which it is lit.
+    pin: int | None  # Its BCM pin; None on a PWM chip.
 
 
 def lamps_of(plan: GuardPlan) -> list[BenchLamp]:

@@ -60,18 +60,14 @@ def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding
             depend on the previous ones. The next one also begins after an error of any kind.
     """
     for name, results in checks:
-        if limit_s is not None:
-            late = f"No answer within {limit_s:g} s: its device or driver hangs. Look at its wires "
-            late += "and supply, restart the computer, and check again."
-            results = finish_in_time(results, limit_s, late)
-        yield from (Finding(name, *result) for result in results)
+        limited = results if limit_s is None else _finish_in_time(results, limit_s)
+        yield from (Finding(name, *result) for result in limited)
 
 
-def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
+def _finish_in_time(results: Results, limit_s: float) -> Results:
     """Yield the results of a check until it ends, fails, or has taken `limit_s` seconds.
 
-    The check runs in a separate thread, which is abandoned if its driver hangs; `late` is the
-    sentence to report then.
+    The check runs in a separate thread, which is abandoned if its driver hangs.
     """
     found: SimpleQueue[Result | None] = SimpleQueue()
 
@@ -91,7 +87,11 @@ def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
         while result := found.get(timeout=max(0.0, until_s - monotonic())):
             yield result
     except Empty:
-        yield "bad", late
+        yield (
+            "bad",
+            f"No answer within {limit_s:g} s: its device or driver hangs. Look at its wires and "
+            "supply, restart the computer, and check again.",
+        )
 
 
 def facts(profile: Profile, *, twin: bool, root: Path = Path("/")) -> list[str]:

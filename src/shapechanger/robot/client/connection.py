@@ -107,10 +107,8 @@ async def receive(websocket: aiohttp.ClientWebSocketResponse) -> messages.RobotM
             return messages.decode_robot_message(received.data)
         case aiohttp.WSMsgType.TEXT:
             raise LinkError("Expected a binary message from the robot, got text.")
-        case aiohttp.WSMsgType.ERROR:
-            raise lost(str(received.data) or "the connection broke")
         case _:
-            raise lost(str(received.extra or "") or "the robot closed it")
+            raise lost(str(received.extra or received.data or "the robot closed it"))
 
 
 def lost(why: str) -> LinkError:
@@ -138,19 +136,10 @@ def _explained(error: Exception, address: Address, timeout_s: float) -> LinkErro
                 "connection is intercepted. Compare it with the one that `shapechanger robot key "
                 "NAME` shows on the robot before you trust it."
             )
-        case aiohttp.WSServerHandshakeError():
-            return LinkError(
-                f"The server at {address} is not a robot of this kind: {error.message}."
-            )
-        case TimeoutError():
-            return LinkError(
-                f"The robot at {address} did not answer within {timeout_s:.1f} s. Is it on, "
-                "and in this network?"
-            )
         case _:
             return LinkError(
-                f"No robot answers at {address} ({error}). Is it on, and does `shapechanger "
-                "robot serve` run on it?"
+                f"No robot answers at {address} within {timeout_s:.1f} s ({error!r}). Is it on, in "
+                "this network, and does `shapechanger robot serve` run on it?"
             )
 
 

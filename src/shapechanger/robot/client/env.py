@@ -90,10 +90,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             env does so at once. "person": always a person. "routine": the reset routine of the
             profile. A function: it is called with the seed.
         on_waiting: Called with a sentence that describes what a reset waits for; None for a warning
-            in the log of `shapechanger.robot.client.operator` after 2 s.
+            in the log of `shapechanger.robot.client.operator`.
         reset_timeout_s: Time limit of a reset, s.
-        max_observation_age_s: Time limit of a step for an observation, s; None for the age at which
-            the robot refuses answers to it.
         timeout_s: Silence of the robot after which the link is lost, s.
         interventions: Whether a person may take control and give it back within an episode.
         role: Whether a person or a program drives.
@@ -128,7 +126,6 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         on_reset: OnReset = "operator",
         on_waiting: Callable[[str], object] | None = None,
         reset_timeout_s: float = 60.0,
-        max_observation_age_s: float | None = None,
         timeout_s: float = 2.0,
         interventions: bool = False,
         role: Role = "program",
@@ -176,9 +173,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self.action_layout = self._spaces.action_layout
         self.record_clock = welcome.clock
         self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
-        self._patience_s = max_observation_age_s or welcome.max_observation_age_ms / 1e3
-        if pace == "lockstep":
-            self._patience_s = _LOCKSTEP_S
+        longest_s = welcome.max_observation_age_ms / 1e3
+        self._patience_s = _LOCKSTEP_S if pace == "lockstep" else longest_s
         self._period_s = 1.0 / welcome.control_hz
         self._last: Received | None = None
         self._has_stepped = False

@@ -16,7 +16,6 @@ from shapechanger.robot.client.observations import RobotSpaces
 from shapechanger.robot.link.messages import Observation
 
 _POLL_S: Final = 0.05  # Period of checks for a person's actions.
-_LOG_AFTER_S: Final = 2.0  # Shorter waits are not logged.
 _NS_PER_S: Final = 1e9
 
 _log = logging.getLogger(__name__)
@@ -24,17 +23,11 @@ _log = logging.getLogger(__name__)
 
 @dataclass(slots=True)
 class Preparation:
-    """Steps of one reset, with one time limit for all of them.
-
-    Attributes:
-        timeout_s: Time limit, s.
-        on_waiting: Called with a sentence that describes each wait; None to log longer ones.
-        known_as: Name of the known robot; "" for an address.
-    """
+    """Steps of one reset, with one time limit for all of them."""
 
     timeout_s: float
-    on_waiting: Callable[[str], object] | None
-    known_as: str
+    on_waiting: Callable[[str], object] | None  # Gets a sentence on each wait; None to log them.
+    known_as: str  # Name of the known robot; "" for an address.
     _since: float = field(default_factory=time.monotonic)
     _reported: set[str] = field(default_factory=set[str])
 
@@ -59,8 +52,7 @@ class Preparation:
             try:
                 return robot.take()
             except RobotRefused as refusal:
-                hint = "P in `shapechanger robot drive` lets a waiting program drive."
-                self._wait(str(refusal), refusal, hint)
+                self._wait(str(refusal), refusal)
 
     def disarm(self, robot: RobotClient) -> None:
         """Disarm the robot, so that a person can put it back."""
@@ -131,16 +123,11 @@ class Preparation:
             is_paced = robot.pace == "lockstep"
             seen = robot.exchange(spaces.rest, seen) if is_paced else robot.ask()
 
-    def _wait(self, sentence: str, failure: LinkError, hint: str = "") -> None:
+    def _wait(self, sentence: str, failure: LinkError) -> None:
         """Report the wait once, and wait a moment; raise the failure after the time limit."""
-        waited_s = self.timeout_s - self._left_s
-        if sentence not in self._reported and (self.on_waiting or waited_s > _LOG_AFTER_S):
+        if sentence not in self._reported:
             self._reported.add(sentence)
-            if self.on_waiting:
-                self.on_waiting(sentence)
-            else:
-                text = f"{sentence} {hint}".rstrip()
-                _log.warning("%s (Waiting for up to %.0f s more.)", text, max(0.0, self._left_s))
+            (self.on_waiting or _log.warning)(sentence)
         if self._left_s < 0.0:
             raise failure from None
         time.sleep(_POLL_S)

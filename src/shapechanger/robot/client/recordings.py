@@ -215,13 +215,12 @@ def _require_fit(episode: Episode, welcome: Welcome) -> None:
     """Refuse a robot that does not fit the recording."""
     recorded = episode.header.actions
     moved = Layout.from_json(welcome.action_layout)
-    ranges = [
-        [(f.name, f.unit, f.shape, f.low, f.high) for f in layout] for layout in (recorded, moved)
-    ]
+    layouts = recorded, moved
+    ranges = [[(f.name, f.unit, f.shape, f.low, f.high) for f in each] for each in layouts]
     if ranges[0] != ranges[1]:
+        told = [", ".join(f"{f} from {f.low:g} to {f.high:g}" for f in each) for each in layouts]
         raise DemosError(
-            f"{welcome.robot} takes {_told(moved)}, and {episode.path.name} was recorded with "
-            f"{_told(recorded)}."
+            f"{welcome.robot} takes {told[1]}, and {episode.path.name} was recorded with {told[0]}."
         )
     rate, own = episode.header.control_hz, welcome.control_hz
     if not is_same_rate(rate, own, rate_jitter(episode.gaps_s, rate)):
@@ -261,7 +260,3 @@ def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
         due_s = max(due_s + period_s, time.monotonic())
     terminal.keys(max(0.0, due_s - time.monotonic()))  # The last command gets a full period, too.
     return f"played {len(steps)} steps"
-
-
-def _told(layout: Layout) -> str:
-    return ", ".join(f"{f} from {f.low:g} to {f.high:g}" for f in layout)

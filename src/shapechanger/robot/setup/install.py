@@ -235,30 +235,21 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class SystemChange:
-    """A change of the machine.
+    """A change of the machine."""
 
-    Attributes:
-        name: Short name, such as "group i2c".
-        state: Sentence that is true once it is made.
-        is_made: Whether it is made.
-        commands: Commands that make it; empty if it has to be made by hand.
-        then: Required step afterwards, such as a restart of the computer.
-        instead: Instruction for a person if there are no commands.
-    """
-
-    name: str
-    state: str
+    name: str  # Such as "group i2c".
+    state: str  # Sentence that is true once it is made.
     is_made: Callable[[], bool]
-    commands: tuple[RootCommand, ...] = ()
-    then: Literal["", "restart", "log in"] = ""
-    instead: str = ""
+    commands: tuple[RootCommand, ...] = ()  # Empty if it has to be made by hand.
+    instead: str = ""  # Instruction for a person if there are no commands.
+    restarts: bool = False  # Whether it takes effect when the computer restarts.
 
 
 class Outcome(NamedTuple):
     """Result of one change."""
 
     change: SystemChange
-    level: Literal["did", "already", "would", "failed"]
+    level: Literal["did", "already", "would", "FAILED"]
     sentence: str
 
 
@@ -275,7 +266,7 @@ def make_changes(
         if change.is_made():
             yield Outcome(change, "already", change.state)
         elif not change.commands:
-            yield Outcome(change, "failed", change.instead)
+            yield Outcome(change, "FAILED", change.instead)
         elif dry:
             yield Outcome(change, "would", typed)
         else:
@@ -283,7 +274,7 @@ def make_changes(
             if not why and not change.is_made():
                 why = "the command had no effect"
             sentence = f"{why}. By hand: {typed}" if why else change.state
-            yield Outcome(change, "failed" if why else "did", sentence)
+            yield Outcome(change, "FAILED" if why else "did", sentence)
 
 
 def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
@@ -337,8 +328,8 @@ def _group(group: str, machine: Machine) -> SystemChange:
         f"{machine.user} is in the group {group}.",
         lambda: machine.user in (members() or ()),
         () if members() is None else (_root("usermod -aG", group, machine.user),),
-        then="log in",
-        instead=f"There is no group {group} here, which Raspberry Pi OS has.",
+        f"There is no group {group} here, which Raspberry Pi OS has.",
+        restarts=True,
     )
 
 
@@ -352,7 +343,7 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
         added = _root("tee -a", machine.config, text=f"\n[all]\n{text}\n")
         otherwise = f"There is no config.txt of Raspberry Pi OS here; it would need {text}."
         commands = (added, *more) if machine.config else ()
-        return SystemChange(name, state, is_made, commands, "restart", otherwise)
+        return SystemChange(name, state, is_made, commands, otherwise, restarts=True)
 
     if needs_pins(profile):
         state = "The pins of a process that dies go low."
@@ -410,6 +401,6 @@ def _serial_port(device: str, machine: Machine) -> SystemChange:
             *machine.by_raspi_config("do_serial_hw", "0"),
             *machine.by_raspi_config("do_serial_cons", "1"),
         ),
-        "restart",
         "Add enable_uart=1 to config.txt, and remove console=serial0,115200 from cmdline.txt.",
+        restarts=True,
     )

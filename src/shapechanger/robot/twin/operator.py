@@ -7,7 +7,6 @@ import inspect
 from collections.abc import Callable
 from typing import Concatenate, NamedTuple, ParamSpec, Self, TypeVar, get_type_hints
 
-from shapechanger.contract.world import RESTING_V
 from shapechanger.errors import RobotError, WorldError, translate_errors
 from shapechanger.robot.drivers.as5600 import Magnet
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
@@ -145,12 +144,6 @@ class Operator:
         """Press or release the emergency stop button."""
         self._board.stop_held = down
         self._board.record("fault", detail=f"stop {'down' if down else 'up'}")
-
-    @_at_board
-    def set_battery(self, volts: float | None) -> None:
-        """Set the battery's voltage without load, V; None for a full one."""
-        self._board.world.resting_v = RESTING_V if volts is None else volts
-        self._board.record("fault", detail=f"battery {volts}")
 
     @_at_board
     def set_distance(self, metres: float | None, *, dead: bool = False) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import json
 import shutil
@@ -12,7 +11,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import IO, Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
 from shapechanger.errors import LinkError, RobotError
 from shapechanger.robot.client.client import RobotClient
@@ -155,7 +154,6 @@ def run_robot(
     clock: Literal["real", "twin"] = "real",
     seed: int = 0,
     folder: Path | None = None,
-    log: IO[bytes] | None = None,
     arguments: tuple[str, ...] = (),
 ) -> RunningRobot:
     """Serve a robot on a free port of 127.0.0.1, as `shapechanger robot serve` does.
@@ -166,7 +164,6 @@ def run_robot(
         clock: Clock of a twin: the machine's, or one that only clients advance.
         seed: Seed of a twin's world.
         folder: Folder for its files; None for a temporary one. A twin that runs there is used.
-        log: Log of its processes; None for a file in the folder.
         arguments: Further arguments of `serve`.
 
     Raises:
@@ -184,12 +181,12 @@ def run_robot(
     command += ["--recordings", str(folder / "recordings"), *arguments]
     if twin:
         command += ["--twin", "--clock", clock, "--seed", str(seed), "--twin-folder", str(folder)]
-    with contextlib.nullcontext(log) if log else (folder / "log.txt").open("wb") as output:
+    with (folder / "log.txt").open("wb") as log:
         supervisor = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=output,
+            stdout=log,
+            stderr=log,
             # So that Ctrl-C first reaches the driving program, which then ends the robot.
             process_group=0,
             # A robot must not run on because a terminal was closed. The setting survives `exec`.

@@ -8,8 +8,8 @@ import select
 import socket
 import subprocess
 import sys
-from collections.abc import Collection, Mapping
-from contextlib import ExitStack, closing, suppress
+from collections.abc import Collection, Generator, Mapping
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -124,25 +124,6 @@ class BoardAt:
         return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})
 
 
-@dataclass(frozen=True, slots=True)
-class RunningBoard(BoardAt):
-    """A board that this process has started. It ends with `close`, or with this process."""
-
-    process: subprocess.Popen[bytes]
-    owner: socket.socket
-
-    def __enter__(self) -> RunningBoard:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """End the board."""
-        self.owner.close()
-        end(self.process, _END_S)
-
-
 def end(process: subprocess.Popen[bytes], within_s: float) -> None:
     """Wait for the end of a process, and kill it if it takes longer."""
     try:
@@ -160,6 +141,7 @@ def find_board(folder: str | os.PathLike[str]) -> tuple[BoardAt, Literal["real",
     return None
 
 
+@contextmanager
 def start_board(
     wiring: GuardPlan,
     clock: Literal["real", "twin"],
@@ -168,8 +150,8 @@ def start_board(
     seed: int = 0,
     one_shot_ms: float | None = ONE_SHOT_MS,
     place: Place | None = None,
-) -> RunningBoard:
-    """Start a board and wait until it listens.
+) -> Generator[BoardAt]:
+    """Start a board, which ends with the `with` block or with this process.
 
     Args:
         wiring: Plan with the simulated wiring.
@@ -200,18 +182,19 @@ def start_board(
         wiring.to_json(), str(at.folder), clock, seed, one_shot_ms, place or Place(), camera
     )
     ours, theirs = socket.socketpair()
+    ours.set_inheritable(True)  # The board outlives an `exec` of this process.
     command = [sys.executable, "-m", "shapechanger.robot.twin.board", str(theirs.fileno())]
-    with ExitStack() as undo:
-        undo.enter_context(ours)
-        with theirs:
-            process = subprocess.Popen(
-                [*command, msgspec.json.encode(settings)],
-                pass_fds=[theirs.fileno()],
-                start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
-            )
-        undo.callback(end, process, 0)
-        ready, _, _ = select.select([ours], [], [], _READY_S)
-        if not ready or not ours.recv(1):
-            raise RobotError("The twin's board did not start; its output above gives the reason.")
-        undo.pop_all()
-    return RunningBoard(at.folder, process, ours)
+    with theirs:
+        process = subprocess.Popen(
+            [*command, msgspec.json.encode(settings)],
+            pass_fds=[theirs.fileno()],
+            start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
+        )
+    try:
+        with ours:  # The board ends when this is closed.
+            ready, _, _ = select.select([ours], [], [], _READY_S)
+            if not ready or not ours.recv(1):
+                raise RobotError("The twin's board did not start; its output gives the reason.")
+            yield at
+    finally:
+        end(process, _END_S)

@@ -3,8 +3,8 @@
 import contextlib
 from dataclasses import dataclass, field
 
+from shapechanger.robot.twin.ledger import read_ledger
 from shapechanger.robot.twin.robot import RunningRobot
-from shapechanger.robot.twin.signals import read_ledger
 from tests.robot.client.attacks.stranger import Stranger, key_bytes
 
 FULL = (1.0, 1.0)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.robot.twin.ledger import read_ledger
 from shapechanger.robot.twin.robot import RunningRobot
-from shapechanger.robot.twin.signals import read_ledger
 from tests.robot.client.attacks.scene import CAP, FULL, WRONG, Scene, key_of, movements, settle
 from tests.robot.client.attacks.stranger import Stranger, header
 

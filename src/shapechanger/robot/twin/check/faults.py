@@ -13,7 +13,7 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Thread
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 from shapechanger.contract.plan import LimitPlan
 from shapechanger.errors import LinkError, RobotError, RobotRefused
@@ -30,22 +30,12 @@ _MOST_BYTES: Final = 65536
 
 
 class BadNetwork:
-    """TCP proxy with faults, from a free port of 127.0.0.1 to another one, until `close`.
-
-    Args:
-        port: Port of 127.0.0.1 to forward to.
-
-    Attributes:
-        latency_s: Least delay of each byte, s.
-        slice_bytes: Most bytes to forward at once.
-        silent: Whether to block all data while connections stay open, as when a radio dies.
-        port: Port on which it listens.
-    """
+    """TCP proxy with faults, from a free port of 127.0.0.1 to another one, until `close`."""
 
     def __init__(self, port: int) -> None:
-        self.latency_s = 0.0
-        self.slice_bytes = _MOST_BYTES
-        self.silent = False
+        self.latency_s = 0.0  # Least delay of each byte, s.
+        self.slice_bytes = _MOST_BYTES  # Most bytes to forward at once.
+        self.silent = False  # Blocks all data while connections stay open, as when a radio dies.
         self._robot_port = port
         self._ends: list[asyncio.StreamWriter] = []  # Alternately the driver's and the robot's.
         self._ended: set[asyncio.StreamWriter] = set()  # Data to these writers are discarded.
@@ -114,23 +104,14 @@ class NotTried(RobotError):
     """A fault could not be tried, which may succeed with a new robot."""
 
 
-@dataclass(frozen=True, slots=True)
-class Scene:
-    """Participants of a trial.
-
-    Attributes:
-        robot: The robot.
-        driver: The driving process.
-        network: The network between them.
-        opened: Resources to close after the trial.
-        board: The board of the robot's twin; None on pins.
-    """
+class Scene(NamedTuple):
+    """Participants of a trial."""
 
     robot: RunningRobot
     driver: Driver
-    network: BadNetwork
-    opened: ExitStack
-    board: Operator | None
+    network: BadNetwork  # Between robot and driver.
+    opened: ExitStack  # Closed after the trial.
+    board: Operator | None  # The board of the robot's twin; None on pins.
 
 
 Make = Callable[[Scene], int | None]
@@ -139,34 +120,21 @@ Make = Callable[[Scene], int | None]
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault.
-
-    Attributes:
-        name: Description.
-        make: Causes it.
-        within_ms: Promised time to rest after `after`, ms.
-        after: How the robot can detect it: at once, by its deadline, or by the age of a frame.
-        then: The robot afterwards: it continues, its processes restart, or it has ended.
-        needs: Required part of the profile: "", "camera", "bumper", "button" or "one-shot". The
-            board makes the faults of the first three, and its ledger dates them.
-        harms: Whether it stops the driving. Otherwise the driver is killed, to measure a stop.
-        silences: Whether later commands of the driver are ignored.
-        guards_late: Whether the guard itself fails, which adds its own promised time.
-        by_policy: Whether a policy drives, as on board, and a person armed the robot for it.
-        on_pins: Whether it is also tried on the pins of a bench with LEDs.
-    """
+    """A fault, and what the robot promises after it."""
 
     name: str
     make: Make
-    within_ms: float = 20.0
+    within_ms: float = 20.0  # Promised time to rest after `after`, ms.
+    # How the robot can detect it: at once, by its deadline, or by the age of a frame.
     after: Literal["", "deadline", "camera"] = ""
-    then: Literal["goes on", "starts afresh", "is gone"] = "goes on"
+    then: Literal["goes on", "starts afresh", "is gone"] = "goes on"  # The robot afterwards.
+    # Required part. The board makes the faults of the first three, and its ledger dates them.
     needs: Literal["", "camera", "bumper", "button", "one-shot"] = ""
-    harms: bool = True
-    silences: bool = False
-    guards_late: bool = False
-    by_policy: bool = False
-    on_pins: bool = False
+    harms: bool = True  # It stops the driving. Otherwise the driver is killed, to measure a stop.
+    silences: bool = False  # Later commands of the driver are ignored.
+    guards_late: bool = False  # The guard itself fails, which adds its own promised time.
+    by_policy: bool = False  # A policy drives, as on board, and a person armed the robot for it.
+    on_pins: bool = False  # It is also tried on the pins of a bench with LEDs.
 
     def limit_ms(self, limits: LimitPlan) -> float:
         """Return the promised time to rest for these limits, ms."""

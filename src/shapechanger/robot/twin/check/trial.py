@@ -25,10 +25,15 @@ from shapechanger.robot.twin.check.driver import Driver
 from shapechanger.robot.twin.check.driving import check_driving
 from shapechanger.robot.twin.check.faults import FAULTS, BadNetwork, Fault, NotTried, Scene
 from shapechanger.robot.twin.hardware import connect
-from shapechanger.robot.twin.judge import Interval, propelled, time_to_rest, unauthorised
+from shapechanger.robot.twin.ledger import (
+    Interval,
+    propelled,
+    read_ledger,
+    time_to_rest,
+    unauthorised,
+)
 from shapechanger.robot.twin.operator import Operator
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
-from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import BoardAt, start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 
@@ -110,28 +115,17 @@ class _ProbeWatcher(Watcher):
 
 @dataclass
 class Bench:
-    """A robot to check, on its twin or on the pins of this machine, until `close`.
-
-    Attributes:
-        profile: The robot.
-        twin: Whether on its twin.
-        one_shot: Whether a twin has the one-shot of the enable line, if the profile has one.
-        probe: Free BCM pin with a wire to the pin of the motor that drives forward; None without.
-        arguments: Further arguments of `serve`.
-        pilot: Module of the program that drives as a policy on board; see `run_driver`.
-        ask: Asks a person.
-        restarts: How often the robot has restarted since it was served.
-    """
+    """A robot to check, on its twin or on the pins of this machine, until `close`."""
 
     profile: Profile
     _: KW_ONLY
-    twin: bool = True
-    one_shot: bool = True
-    probe: int | None = None
-    arguments: tuple[str, ...] = ()
-    pilot: str = ""
-    ask: Ask = lambda _: None
-    restarts: int = field(default=0, init=False)
+    twin: bool = True  # Whether on its twin.
+    one_shot: bool = True  # Whether a twin has the one-shot of the enable line, as the profile.
+    probe: int | None = None  # Free BCM pin, wired to the pin of the motor that drives forward.
+    arguments: tuple[str, ...] = ()  # Further arguments of `serve`.
+    pilot: str = ""  # Module of the program that drives as a policy on board; see `Driver`.
+    ask: Ask = lambda _: None  # Asks a person.
+    restarts: int = field(default=0, init=False)  # Restarts of the robot since it was served.
 
     def __post_init__(self) -> None:
         if self.twin and self.probe is not None:
@@ -220,22 +214,15 @@ _LATE_MS: Final = 20.0
 
 @dataclass(frozen=True, slots=True)
 class TrialResult:
-    """Result of one trial.
+    """Result of one trial."""
 
-    Attributes:
-        stopped_ms: Time from the fault to permanent rest, ms; infinite for never, NaN if it is not
-            measured.
-        limit_ms: The promised time, ms.
-        drove: Whether it was driving at the fault; the trial is void otherwise.
-        unauthorised: Times of propulsion without a fresh command; empty without a ledger.
-        answer: Whether a person saw it drive and stop; None without an answer.
-    """
-
+    # Time from the fault to permanent rest, ms; infinite for never, NaN if it is not measured.
     stopped_ms: float
-    limit_ms: float
-    drove: bool
+    limit_ms: float  # The promised time, ms.
+    drove: bool  # Whether it was driving at the fault; the trial is void otherwise.
+    # Times of propulsion without a fresh command; empty without a ledger.
     unauthorised: tuple[Interval, ...] = ()
-    answer: bool | None = None
+    answer: bool | None = None  # Whether a person saw it drive and stop; None without an answer.
 
     @property
     def kept(self) -> bool:

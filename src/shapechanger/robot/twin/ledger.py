@@ -1,0 +1,183 @@
+"""Ledger of the board: all changes of its outputs, and the decision whether one was permitted.
+
+The board writes each change of a pin, pulse or chip to one line of the ledger, as JSON.
+
+Lines have a time `t` in nanoseconds and a kind:
+
+```
+pin     pin, duty, hz, pid       an output: its level (hz 0), or the duty of its software PWM
+        released: true           the pin is no longer driven: its resistors set its level
+pulse   pin, us, hz, pid         servo pulses; 0 us for none
+i2c     bus, address, register, data, pid      bytes written to a chip
+        bus, address, channel, us, hz          the resulting pulses of a PWM channel
+gone    pid                      a process died; the next lines are the levels of its pins
+input   pin, level               an edge of a sensor
+place   seed                     the operator placed the vehicle at a start
+put_back                         the operator put the vehicle back after a collision
+course  seed                     the operator replaced the surroundings
+fault   detail                   the operator broke or pressed something
+```
+
+Each line is written at once, so that a crash leaves at most one broken line, the last.
+
+The ledger alone decides whether a robot moved without permission. The inputs are the ledger, the
+wiring and the times at which the robot was permitted to move, but nothing from the robot's own
+programs.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from shapechanger.errors import RobotError, translate_errors
+from shapechanger.robot.drivers.simulation import Levels, Pulse, PwmChannel, WiredOutput
+from shapechanger.robot.twin.wiring import TwinWiring
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """One line of the ledger, see the module; None for fields that its kind does not have.
+
+    `pid` is the process that made the change, `pin` a BCM number, `duty` a share of the time from 0
+    to 1, `hz` a frequency in Hz, and `us` the width of pulses in microseconds.
+    """
+
+    t: int
+    kind: str
+    pid: int | None = None
+    pin: int | None = None
+    duty: float | None = None
+    hz: float | None = None
+    us: float | None = None
+    bus: int | None = None
+    address: int | None = None
+    channel: int | None = None
+    register: int | None = None
+    data: tuple[int, ...] | None = None
+    level: int | None = None
+    released: bool = False
+    seed: int | None = None
+    detail: str | None = None
+
+
+def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
+    """Read all complete lines of a ledger, ordered by time.
+
+    Processes stamp their changes, so lines of two processes may be out of order in the file.
+    """
+    decode = msgspec.json.Decoder(Transition).decode
+    transitions: list[Transition] = []
+    with translate_errors(
+        msgspec.MsgspecError,
+        to=lambda error: RobotError(
+            f"Line {len(transitions) + 1} of {path} is malformed: {error}."
+        ),
+    ):
+        # After the last newline there is at most a broken line.
+        for line in Path(path).read_bytes().split(b"\n")[:-1]:
+            transitions.append(decode(line))
+    return sorted(transitions, key=lambda transition: transition.t)
+
+
+def _apply(levels: Levels, transition: Transition) -> None:
+    """Apply one line of the ledger."""
+    pin, us, hz = transition.pin, transition.us, transition.hz
+    if transition.kind == "pin" and pin is not None:
+        if transition.released or transition.duty is None:
+            levels.release(pin)
+        else:
+            levels.drive(pin, transition.duty, transition.t)
+    elif us is None or hz is None:
+        return
+    elif transition.kind == "pulse" and pin is not None:
+        levels.pulse(pin, Pulse(us, hz))
+    elif transition.kind == "i2c":
+        bus, address, channel = transition.bus, transition.address, transition.channel
+        if bus is not None and address is not None and channel is not None:
+            levels.channels[PwmChannel(bus, address, channel)] = Pulse(us, hz)
+
+
+class Interval(NamedTuple):
+    """A time interval in which an output was not at rest."""
+
+    output: str
+    start_ns: float
+    end_ns: float  # Infinite if it does not end.
+    value: float  # Value with the largest magnitude; 0 if unknown.
+
+
+def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval]:
+    """Return when each propelling output was not at rest.
+
+    A pin with PWM counts with its duty. The last levels remain, unless the one-shot of the enable
+    line cuts the power.
+    """
+    found: list[Interval] = []
+    running: dict[str, Interval] = {}
+    for t, outputs in _moments(ledger, wiring):
+        for name in wiring.propelling:
+            value, at_rest = outputs[name]
+            if not at_rest:
+                since = running.get(name, Interval(name, t, math.inf, 0.0))
+                running[name] = since._replace(value=max(since.value, value or 0.0, key=abs))
+            elif name in running:
+                found.append(running.pop(name)._replace(end_ns=t))
+    found.extend(running.values())
+    return [interval for interval in found if interval.end_ns > interval.start_ns]
+
+
+def unauthorised(
+    ledger: Iterable[Transition],
+    wiring: TwinWiring,
+    permitted: Iterable[tuple[float, float]],
+) -> list[Interval]:
+    """Return when a propelling output was not at rest without permission.
+
+    Args:
+        ledger: Transitions, ordered by time.
+        wiring: Wiring of the robot.
+        permitted: Start and end of each time in which it may move, ns, such as from the arrival of
+            a command to its deadline.
+    """
+    never = (math.inf, math.inf)
+    permits = [*sorted(permitted), never]
+    found: list[Interval] = []
+    for interval in propelled(ledger, wiring):
+        at_ns = interval.start_ns
+        for start_ns, end_ns in permits:
+            gap = interval._replace(start_ns=at_ns, end_ns=min(start_ns, interval.end_ns))
+            if gap.end_ns > gap.start_ns:
+                found.append(gap)
+            at_ns = max(at_ns, end_ns)
+    return found
+
+
+def time_to_rest(ledger: Iterable[Transition], wiring: TwinWiring, fault_ns: int) -> float:
+    """Return the time from a fault until all propelling outputs are at rest for good.
+
+    Returns:
+        Seconds; 0 if they were at rest before and stayed so, infinite if one never comes to rest.
+    """
+    ends = [interval.end_ns for interval in propelled(ledger, wiring)]
+    return max(0.0, max(ends, default=0.0) - fault_ns) / 1e9
+
+
+def _moments(
+    ledger: Iterable[Transition], wiring: TwinWiring
+) -> Iterator[tuple[int, dict[str, WiredOutput]]]:
+    """Yield the states of the outputs after each transition and at the end of the one-shot."""
+    levels = Levels()
+    for line in (*ledger, None):
+        ends_ns = wiring.power_ends_ns(levels)
+        if ends_ns is not None and (line is None or ends_ns < line.t):
+            yield ends_ns, wiring.read(levels, ends_ns)
+        if line is not None:
+            _apply(levels, line)
+            yield line.t, wiring.read(levels, line.t)
