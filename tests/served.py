@@ -9,9 +9,8 @@ from typing import Any, Literal
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.link.messages import Observation
-from shapechanger.robot.twin.ledger import propelled, read_ledger
+from shapechanger.robot.twin.ledger import TwinWiring, propelled, read_ledger
 from shapechanger.robot.twin.robot import Operator, RunningRobot
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.robots import until
 
 Clock = Literal["twin", "real"]

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.ledger import read_ledger
+from shapechanger.robot.twin.ledger import TwinWiring, read_ledger
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.robots import until
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import driving

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robots import IN_A_ROOM, write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]

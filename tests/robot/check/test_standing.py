@@ -22,8 +22,8 @@ from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.install import unit_name
+from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.room import DrivingWorld
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.check.held_pins import HeldPins, shipped
 from tests.robot.profile.texts import finger_text, read
 from tests.robot.twin.in_process import LocalBoard

@@ -12,8 +12,8 @@ from shapechanger.layout import Layout
 from shapechanger.robot.drivers import chip
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.profile import Profile, load_profile, read_profile, shipped_profiles
+from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.room import DrivingWorld
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.drivers.outside.bh1750 import LUX
 from tests.robot.twin.in_process import InProcessRobot
 

@@ -7,8 +7,8 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.setup.calibration import find_joint_zeros, find_zeros
+from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.room import DrivingWorld
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.check.held_pins import shipped
 from tests.robot.twin.in_process import LocalBoard
 

@@ -32,9 +32,9 @@ from shapechanger.robot.link.messages import Command, Observation, Welcome
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.board import START_NS
 from shapechanger.robot.twin.hardware import SteadyClock, TwinHardware
+from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.pin_board import PinBoard
 from shapechanger.robot.twin.rpc import BoardClient
-from shapechanger.robot.twin.wiring import TwinWiring
 
 # Ticks in which the guard must arm, once all speed controllers listen.
 _MAX_ARM_TICKS: Final = 10

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from shapechanger.errors import RobotError
 from shapechanger.robot.twin.ledger import (
     Transition,
+    TwinWiring,
     propelled,
     read_ledger,
     time_to_rest,
@@ -18,7 +19,6 @@ from shapechanger.robot.twin.ledger import (
 )
 from shapechanger.robot.twin.pin_board import PinBoard
 from shapechanger.robot.twin.room import DrivingWorld
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc
 
 _MS = 1_000_000

@@ -10,11 +10,10 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.twin.hardware import connect
-from shapechanger.robot.twin.ledger import read_ledger
+from shapechanger.robot.twin.ledger import TwinWiring, read_ledger
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.start import start_board
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.in_process import LocalBoard
 from tests.robot.twin.robots import ACTIONS, CAR, process, servo
 

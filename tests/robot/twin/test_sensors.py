@@ -18,9 +18,9 @@ from shapechanger.finger.twin import FingerWorld
 from shapechanger.robot.drivers.as5600 import open_and_read
 from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS, SensorDriver
 from shapechanger.robot.drivers.simulation import Levels, Pulse
+from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.room import DrivingWorld
-from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.in_process import LocalBoard
 from tests.robot.twin.robots import ACTIONS, BUMPER, CAR, DRIVE, ENCODER, STEER, esc, hbridge, servo
 

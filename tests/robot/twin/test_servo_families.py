@@ -15,7 +15,7 @@ from shapechanger.robot.guard.outputs import Switches, make_safe
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.twin.wiring import TwinWiring
+from shapechanger.robot.twin.ledger import TwinWiring
 from tests.robot.profile.texts import finger_text, read
 from tests.robot.twin.in_process import InProcessRobot, LocalBoard
 

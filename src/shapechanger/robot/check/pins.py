@@ -73,13 +73,7 @@ def probed_pin(plan: GuardPlan, probe: int) -> int:
 
 
 def check_jumper(output: int, sensed: int, plan: GuardPlan) -> str:
-    """Toggle a pin, check that the pin that is wired to it follows, and describe the result.
-
-    Args:
-        output: BCM pin to drive, unused by the robot.
-        sensed: BCM pin to read, unused by the robot.
-        plan: The robot.
-    """
+    """Toggle a pin, check that the pin that is wired to it follows, and describe the result."""
     from gpiozero import DigitalInputDevice, DigitalOutputDevice
 
     for pin in (output, sensed):
@@ -165,12 +159,8 @@ def check_lamps(
 ) -> Iterator[Finding]:
     """Light each LED alone, and ask or measure whether it is lit.
 
-    Args:
-        plan: The robot.
-        connect_pins: Opens its pins and buses; no other program may use them meanwhile.
-        ask: Asks the person.
-        sees: Measures whether an LED is lit; None if it cannot.
-        shown_s: Time for which an LED is lit if no person answers, s.
+    `connect_pins` opens the pins and buses, which no other program may use meanwhile. `sees`
+    measures whether an LED is lit; None if it cannot. Without an answer, it is lit for `shown_s`.
     """
     for lamp in lamps_of(plan):
         check = f"LED {lamp.place}"

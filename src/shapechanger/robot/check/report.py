@@ -54,10 +54,8 @@ def judged(good: bool, sentence: str, otherwise: str = "") -> Result:
 def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding]:
     """Yield the findings of checks.
 
-    Args:
-        checks: The checks.
-        limit_s: Time limit for each check, s, after which the next one begins; None for checks that
-            depend on the previous ones. The next one also begins after an error of any kind.
+    After an error of any kind, or after `limit_s` seconds, the next one begins. None is for checks
+    that depend on the previous ones.
     """
     for name, results in checks:
         limited = results if limit_s is None else _finish_in_time(results, limit_s)
@@ -130,12 +128,8 @@ def write_report(
 ) -> bool:
     """Run the parts of a check, and report each finding as it comes.
 
-    Args:
-        parts: Name and findings of each part.
-        say: Shows a person a line.
-        path: File for the lines, without the names of the computer and its user. If it exists, a
-            number is added to the name. None for no file.
-        head: First lines of the file.
+    `say` shows a person each line. The file at `path`, if any, begins with the `head`, and lacks
+    the names of the computer and its user. If it exists, a number is added to the name.
 
     Returns:
         Whether no finding was bad.

@@ -39,14 +39,6 @@ _CHECK_EVERY: Final = 0.1
 _DISK_S: Final = 30.0  # Time that a robot may take to read its disk, s.
 
 
-def _own_name() -> str:
-    """Return the default name of a client: user and host."""
-    user = "unknown"
-    with contextlib.suppress(KeyError, OSError):  # A container may have no user name.
-        user = getpass.getuser()
-    return f"{user}@{socket.gethostname()}"[:64]
-
-
 class RobotClient(Inbox):
     """Connection to a robot, made by `connect` and maintained by a background thread.
 
@@ -114,10 +106,13 @@ class RobotClient(Inbox):
             if not fingerprint:
                 raise untrusted(parse_address(robot), timeout_s)
             robot = KnownRobot("robot", robot, key, fingerprint)
+        own_name = f"user@{socket.gethostname()}"
+        with contextlib.suppress(KeyError, OSError):  # A container may have no user name.
+            own_name = f"{getpass.getuser()}@{socket.gethostname()}"
         hello = Hello(
             version=messages.VERSION,
             proof=b"",
-            name=name or _own_name(),
+            name=name or own_name[:64],
             role=role,
             pace=pace,
             frames=frames,
@@ -350,11 +345,9 @@ class RobotClient(Inbox):
             self._call(self._stop.set)
 
     def __enter__(self) -> Self:
-        """The client itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End the connection."""
         self.close()
 
     # In the callers' threads.

@@ -145,17 +145,11 @@ def _explained(error: Exception, address: Address, timeout_s: float) -> LinkErro
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """An observation and its time of arrival.
-
-    Attributes:
-        message: The observation.
-        received_at: Time of arrival on this machine's monotonic clock, s.
-        jpeg: Frame number `message.frame_seq`, from this or an earlier message; None without one.
-    """
+    """An observation and its time of arrival."""
 
     message: messages.Observation
-    received_at: float
-    jpeg: bytes | None
+    received_at: float  # Time of arrival on this machine's monotonic clock, s.
+    jpeg: bytes | None  # Frame `message.frame_seq`, from this or an earlier message, if any.
 
 
 class Inbox:
@@ -163,17 +157,12 @@ class Inbox:
 
     The newest observation is in one slot, so that a slow reader never gets an old one. A robot
     sends each frame once, so an observation that replaces an unread one takes over its frame.
-
-    Attributes:
-        newest: The newest observation of any age; None before the first.
-        heard: Number of messages so far.
-        failure: Why the link is lost; None while it is up.
     """
 
     def __init__(self, clock: Callable[[], float], patience_s: float) -> None:
-        self.newest: Received | None = None
-        self.heard = 0
-        self.failure: LinkError | None = None
+        self.newest: Received | None = None  # The newest observation of any age.
+        self.heard = 0  # Number of messages so far.
+        self.failure: LinkError | None = None  # Why the link is lost; None while it is up.
         self._clock = clock
         self._patience_s = patience_s  # Default time limit of a wait.
         self._process = os.getpid()
@@ -237,11 +226,7 @@ class Inbox:
             return find()
 
     def observation(self, newer_than: int = 0, timeout_s: float | None = None) -> Received:
-        """Wait for an observation, and return the newest one.
-
-        Args:
-            newer_than: Its `seq` is larger than this.
-            timeout_s: Time limit, s; None for the link's.
+        """Wait for an observation with a larger `seq` than `newer_than`, and return the newest one.
 
         Raises:
             StaleObservation: If none arrives in time.
@@ -269,11 +254,7 @@ class Inbox:
     ) -> _M:
         """Wait for a message that answers a request, which was sent after message number `since`.
 
-        Args:
-            kind: Kind of answer.
-            since: `heard` before the request.
-            accepts: Whether a message of this kind is the answer.
-            timeout_s: Time limit, s; None for the link's, and then no refusal is expected.
+        Without a `timeout_s`, the link's time limit applies, and no refusal is expected.
         """
 
         def find() -> _M | messages.Refused | None:

@@ -387,12 +387,7 @@ def latencies(
 ) -> dict[str, float]:
     """Return the measurable delays of a step, s.
 
-    Args:
-        answered: The observation that the command answers.
-        seq: Number of the command.
-        sent_at: Time at which it was sent on this machine's clock, s.
-        received: The observation after it.
-        clock: Source of the robot's time; a twin may run faster or slower than real time.
+    The command `seq` was sent at `sent_at`, s, in answer to `answered`, and `received` followed.
 
     Returns:
         `capture_to_send`: from the capture of the frame to its sending, by the robot's clock. If

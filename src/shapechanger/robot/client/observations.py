@@ -46,29 +46,17 @@ def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
 
 
 class View(NamedTuple):
-    """Observation of an env, and fields for its `info`.
+    """Observation of an env, and fields for its `info`."""
 
-    Attributes:
-        observation: The observation, which shares no memory.
-        fresh: Whether its image differs from the previous one; True without images.
-        absent: Names of the state's features that no sensor measures now.
-    """
-
-    observation: Any
-    fresh: bool
-    absent: tuple[str, ...]
+    observation: Any  # It shares no memory.
+    fresh: bool  # Whether its image differs from the previous one; True without images.
+    absent: tuple[str, ...]  # Names of the state's features that no sensor measures now.
 
 
 class RobotSpaces:
     """Spaces and layouts of one robot, and observations from its messages.
 
-    Attributes:
-        action_layout: Layout of an action.
-        action_space: One number for each action of the robot.
-        observation_layout: Layout of an observation; an image is one block.
-        observation_space: Space of the image, the state, or both.
-        has_image: Whether observations have an image.
-        picture: The newest image at the camera's size; None before the first.
+    An observation is an image, which is one block of its layout, the state, or both.
     """
 
     def __init__(
@@ -101,7 +89,7 @@ class RobotSpaces:
             space = gym.spaces.Dict(both) if self._has_state else image_space
         self.observation_layout = Layout(features)
         self.observation_space = space
-        self.picture: NDArray[np.uint8] | None = None
+        self.picture: NDArray[np.uint8] | None = None  # The newest, at the camera's size.
         self.reconnect()
 
     def reconnect(self) -> None:

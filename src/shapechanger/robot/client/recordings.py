@@ -198,17 +198,11 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
             say("cancelled; nothing was played")
             return
         with contextlib.ExitStack() as leaving:
-            leaving.callback(_give_back, robot)
+            leaving.callback(lambda: (robot.disarm(), robot.release()) if robot.alive else None)
             robot.take()
             robot.arm()
             ended = _play(robot, terminal, episode)
         say(ended)
-
-
-def _give_back(robot: RobotClient) -> None:
-    if robot.alive:
-        robot.disarm()
-        robot.release()
 
 
 def _require_fit(episode: Episode, welcome: Welcome) -> None:

@@ -57,15 +57,7 @@ class HeldKeys:
         self._held: dict[str, _Held] = {}
 
     def press(self, key: str, now_s: float) -> bool:
-        """Register a key press.
-
-        Args:
-            key: Name of the key.
-            now_s: Time of the press, s.
-
-        Returns:
-            Whether it is a direction key.
-        """
+        """Register a key press at a time, s, and return whether it is a direction key."""
         if key not in DIRECTIONS:
             return False
         action, value = DIRECTIONS[key]
@@ -81,12 +73,7 @@ class HeldKeys:
         return True
 
     def value(self, action: str, now_s: float) -> float:
-        """Return the held value of an action: -1, 0 or 1.
-
-        Args:
-            action: Name of the action, such as "steering".
-            now_s: Present time, s.
-        """
+        """Return the held value of an action, such as "steering", at a time, s: -1, 0 or 1."""
         held = self._held.get(action)
         return held.value if held is not None and now_s <= held.until_s else 0.0
 
@@ -146,11 +133,7 @@ class KeyParser:
         return self._last_s + ESCAPE_WAIT_S if self._begun else math.inf
 
     def feed(self, data: bytes, now_s: float) -> list[str]:
-        """Parse input.
-
-        Args:
-            data: The bytes.
-            now_s: Time at which they were read, s.
+        """Parse bytes that were read at a time, s.
 
         Returns:
             The keys: letters in lower case, "up", "down", "left", "right", "space", "escape",
@@ -175,11 +158,7 @@ class KeyParser:
         return keys
 
     def expire(self, now_s: float) -> list[str]:
-        """Return Escape if an escape character, or the rest of an arrow, was not followed in time.
-
-        Args:
-            now_s: Present time, s.
-        """
+        """Return Escape if the rest of an arrow has not come by a time, s, as it should have."""
         if now_s < self.due_s:
             return []
         self._begun, self._is_lost = b"", True

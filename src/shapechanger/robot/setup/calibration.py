@@ -99,10 +99,7 @@ def find_joint_zeros(
 ) -> dict[str, int]:
     """Average the encoder readings while a person holds the joints straight.
 
-    Args:
-        plan: The robot.
-        hardware: Gives access to its buses.
-        wait: Waits for about 10 ms.
+    `wait` waits for about 10 ms.
 
     Returns:
         Counts of each encoder, 0 to 4095, keyed by sensor and joint, such as `joints.MCP_flexion`.
@@ -139,11 +136,8 @@ def require_homing(settings: BusSettings) -> None:
 def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
     """Pull all tendons of a held bus until all servos stand still, in a known posture.
 
-    Slack tendons are taken up meanwhile.
-
-    Args:
-        bus: The bus.
-        cycle: Sends the requested tensions, runs a cycle, and returns its time, ns.
+    Slack tendons are taken up meanwhile. `cycle` sends the requested tensions, runs a cycle, and
+    returns its time, ns.
 
     Returns:
         Position of each servo at the zero of its tendon, in counts, keyed by name.

@@ -15,7 +15,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
@@ -93,11 +93,8 @@ def write_unit(
 ) -> tuple[Path, bool]:
     """Write the unit next to a profile unless it exists; return it and whether it is new.
 
-    Args:
-        robot: Name of the robot.
-        profile: Its profile, which need not exist yet.
-        credentials: Folder of its key and certificate; None for the default.
-        user: User that runs it, a member of the groups of its devices; "" for this one.
+    The profile need not exist yet. The `user` who runs it, by default this one, is a member of the
+    groups of its devices.
     """
     path = profile.absolute().parent / unit_name(robot)
     options = f" --credentials {unit_word(str(credentials.absolute()))}" if credentials else ""
@@ -153,16 +150,11 @@ def _root(command: str, *more: object, text: str = "") -> RootCommand:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The computer of a robot.
+    """The computer of a robot."""
 
-    Attributes:
-        user: User that is to run the robot.
-        root: Root of the file system.
-        run: Runs a command as root, and returns why it failed; empty if it did not.
-    """
-
-    user: str = ""
-    root: Path = Path("/")
+    user: str = ""  # User that is to run the robot.
+    root: Path = Path("/")  # Root of the file system.
+    # Runs a command as root, and returns why it failed; empty if it did not.
     run: Callable[[RootCommand], str] = run_as_root
 
     @property
@@ -226,11 +218,6 @@ class Machine:
                 "This machine is not a Raspberry Pi: installing needs one with Raspberry Pi OS; "
                 "`shapechanger robot serve --twin` runs the robot on simulated pins here."
             )
-
-    def by_raspi_config(self, *call: str) -> tuple[RootCommand, ...]:
-        """Return a call of raspi-config, which supports all models, if it exists."""
-        exists = (self.root / "usr/bin/raspi-config").exists()
-        return (_root("raspi-config nonint", *call),) if exists else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -355,9 +342,7 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
         if bus == _ARM_BUS:
             module = _root("tee", machine.root / _MODULES, text="i2c-dev\n")
             is_on = partial(machine.sets, "i2c")
-            change = line("I2C", state, "dtparam=i2c_arm=on", is_on, module)
-            by_raspi_config = machine.by_raspi_config("do_i2c", "0")
-            yield replace(change, commands=by_raspi_config or change.commands)
+            yield line("I2C", state, "dtparam=i2c_arm=on", is_on, module)
         else:
             exists = (machine.root / device.lstrip("/")).exists
             reason = f"Bus {bus} needs an overlay that depends on its pins, as dtoverlay=i2c{bus}."
@@ -393,14 +378,13 @@ def _serial_port(device: str, machine: Machine) -> SystemChange:
         is_on = machine.settings().get("enable_uart") == "1" or machine.sets("uart0")
         return is_on and bool(lines) and "console=serial0" not in _text(lines)
 
+    calls = "do_serial_hw 0", "do_serial_cons 1"
+    commands = tuple(_root(f"raspi-config nonint {call}") for call in calls)
     return SystemChange(
         "serial port",
         f"{device} is on, and no console uses it.",
         is_made,
-        (
-            *machine.by_raspi_config("do_serial_hw", "0"),
-            *machine.by_raspi_config("do_serial_cons", "1"),
-        ),
+        commands if (machine.root / "usr/bin/raspi-config").exists() else (),
         "Add enable_uart=1 to config.txt, and remove console=serial0,115200 from cmdline.txt.",
         restarts=True,
     )

@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple, get_origin, get_type_hints
+from typing import Any, Final, Literal, get_origin, get_type_hints
 
 import msgspec
 
@@ -25,11 +25,11 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError, ShapechangerError, translate_errors
 from shapechanger.robot.guard.running import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
+from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.pin_board import PinBoard
 from shapechanger.robot.twin.rpc import BoardConnection, Call, Greeting, Role, Slept
 from shapechanger.robot.twin.start import BoardAt, BoardSettings, open_world
-from shapechanger.robot.twin.wiring import TwinWiring
 
 START_NS: Final = 1_000_000_000
 """First time of the twin's clock; not 0, which could mean "never"."""
@@ -72,12 +72,8 @@ class Board:
     """Executes the calls of clients; time is CLOCK_MONOTONIC, and a step of the world 10 ms.
 
     A parameter `caller` of a called function gets the connection. It may raise a
-    `ShapechangerError`, or an `OSError` with its `errno`.
-
-    Args:
-        settings: Its settings.
-        owner_fd: Descriptor that is readable once its owner has ended; it gets a byte once the
-            board listens.
+    `ShapechangerError`, or an `OSError` with its `errno`. `owner_fd` gets a byte once the board
+    listens, and is readable once its owner has ended.
     """
 
     def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
@@ -221,15 +217,6 @@ class Board:
             self._camera.take(now_ns)
 
 
-class _Sleeper(NamedTuple):
-    """A client that sleeps, ordered by the end of its sleep and then by arrival."""
-
-    until_ns: int
-    number: int
-    connection: BoardConnection
-    call_id: int | None
-
-
 class TwinTimeBoard(Board):
     """A board whose time advances only while a client sleeps, and waits for all that take part.
 
@@ -240,7 +227,8 @@ class TwinTimeBoard(Board):
     def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
         self._now_ns = START_NS
         self._ticks = 0
-        self._sleepers: list[_Sleeper] = []
+        # Ends of sleeps, ordered by time and then by arrival: time, number, caller and call.
+        self._sleepers: list[tuple[int, int, BoardConnection, int | None]] = []
         self._sleeps = 0
         self._wanted_ns: dict[BoardConnection, int] = {}  # Next end of each participant's wait.
         super().__init__(settings, owner_fd)
@@ -258,8 +246,7 @@ class TwinTimeBoard(Board):
     def sleep(self, caller: BoardConnection, ns: int) -> object:
         """Let a client sleep for `ns` nanoseconds, which ends with a `Slept`."""
         self._sleeps += 1
-        until_ns = self._now_ns + ns
-        self._sleepers.append(_Sleeper(until_ns, self._sleeps, caller, caller.call_id))
+        self._sleepers.append((self._now_ns + ns, self._sleeps, caller, caller.call_id))
         return _LATER
 
     def run(self) -> None:
@@ -272,16 +259,16 @@ class TwinTimeBoard(Board):
                 found = camera is None or camera.find_reader()
                 self._serve(None if found else _LOOK_FOR_READER_S)
             # Clients that have disconnected no longer sleep.
-            self._sleepers = [one for one in self._sleepers if not one.connection.closed]
+            self._sleepers = [one for one in self._sleepers if not one[2].closed]
             if not self._sleepers:
                 continue
-            first = min(self._sleepers)
-            if first.until_ns > self._now_ns:
-                self._step(first.until_ns)
-            if first.until_ns <= self._now_ns:
+            until_ns, _, connection, call_id = first = min(self._sleepers)
+            if until_ns > self._now_ns:
+                self._step(until_ns)
+            if until_ns <= self._now_ns:
                 self._sleepers.remove(first)
                 newest_ns = None if camera is None else camera.newest_ns
-                first.connection.reply(first.call_id, Slept(self._now_ns, newest_ns))
+                connection.reply(call_id, Slept(self._now_ns, newest_ns))
 
     def _step(self, end_ns: int) -> None:
         """Advance to the time of the next event."""

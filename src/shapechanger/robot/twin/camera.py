@@ -28,12 +28,7 @@ _FIONREAD: Final = 0x541B
 
 @dataclass
 class FrontCameraPipe:
-    """Takes images and writes them into a FIFO, without ever waiting for its reader.
-
-    Attributes:
-        next_ns: Time of the next image.
-        newest_ns: Capture time of the newest image that was written; None before.
-    """
+    """Takes images and writes them into a FIFO, without ever waiting for its reader."""
 
     path: Path  # Path of the FIFO.
     plan: CameraPlan
@@ -46,8 +41,8 @@ class FrontCameraPipe:
     barcode: bool = True  # Whether the first rows of an image show its capture time.
 
     def __post_init__(self) -> None:
-        self.next_ns = self.start_ns
-        self.newest_ns: int | None = None
+        self.next_ns = self.start_ns  # Time of the next image.
+        self.newest_ns: int | None = None  # Capture time of the newest image that was written.
         self._taken = 0
         self._fd: int | None = None
         self._rest = b""  # Rest of an image that did not fit into the pipe.

@@ -20,6 +20,10 @@ fault   detail                   the operator broke or pressed something
 
 Each line is written at once, so that a crash leaves at most one broken line, the last.
 
+The wiring computes the value of each output from the levels of pins and pulses: the chip of each
+output inverts its driver. Its plan is the served plan by default, and may differ: if two pins are
+swapped only in the served profile, the wrong motor turns.
+
 The ledger alone decides whether a robot moved without permission. The inputs are the ledger, the
 wiring and the times at which the robot was permitted to move, but nothing from the robot's own
 programs.
@@ -29,16 +33,17 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 
+from shapechanger.contract.plan import GuardPlan, OutputPlan, driven_pins
 from shapechanger.errors import RobotError, translate_errors
+from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.drivers.simulation import Levels, Pulse, PwmChannel, WiredOutput
-from shapechanger.robot.twin.wiring import TwinWiring
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +109,70 @@ def _apply(levels: Levels, transition: Transition) -> None:
             levels.channels[PwmChannel(bus, address, channel)] = Pulse(us, hz)
 
 
+ONE_SHOT_MS: Final = 100.0
+"""Time for which the one-shot of the enable line keeps the motors' power on after an edge."""
+
+
+class TwinWiring:
+    """Wiring of a robot, whose one-shot, if any, holds the power for `one_shot_ms` after edges."""
+
+    def __init__(self, plan: GuardPlan, one_shot_ms: float | None = ONE_SHOT_MS) -> None:
+        self.plan = plan
+        has_one_shot = plan.enable_pin is not None and one_shot_ms is not None
+        self._one_shot_ns = int((one_shot_ms or 0.0) * 1e6) if has_one_shot else None
+        keys = (one.settings for one in plan.outputs if one.settings.get("over") == "pca9685")
+        self._high = {one["output_enable"] for one in keys if one.get("output_enable", -1) >= 0}
+        self._low = driven_pins(plan).keys()
+        self._states = {output.name: self._state(output) for output in plan.outputs}
+        self.outputs: Mapping[str, OutputPlan] = {output.name: output for output in plan.outputs}
+        ahead = {action.name for action in plan.actions if action.propels}
+        self.propelling = tuple(
+            one.name for one in plan.outputs if any(one.mix.get(name) for name in ahead)
+        )
+
+    def idle_level(self, pin: int) -> int:
+        """Return the level of an undriven pin.
+
+        The hardware guide asks for pull-downs on all outputs, and for a pull-up on the output
+        enable of a PCA9685, which is active low.
+        """
+        return int(pin in self._high)
+
+    def has_resistor(self, pin: int) -> bool:
+        """Return whether an external resistor sets the level of an undriven pin."""
+        return pin in self._high or pin in self._low
+
+    def power_ends_ns(self, levels: Levels) -> int | None:
+        """Return when the one-shot cuts the motors' power, ns; None without a one-shot."""
+        if self._one_shot_ns is None or self.plan.enable_pin is None:
+            return None
+        edge_ns = levels.edges_ns.get(self.plan.enable_pin)
+        return 0 if edge_ns is None else edge_ns + self._one_shot_ns
+
+    def has_power(self, levels: Levels, now_ns: int) -> bool:
+        """Return whether the one-shot, if there is one, leaves the motors their power."""
+        ends_ns = self.power_ends_ns(levels)
+        return ends_ns is None or now_ns < ends_ns
+
+    def read(self, levels: Levels, now_ns: int) -> dict[str, WiredOutput]:
+        """Return the state of each output at a time, ns, keyed by name."""
+        powered = self.has_power(levels, now_ns)
+        return {
+            name: (None if powered else OUTPUTS[self.outputs[name].driver].unpowered)
+            or state(levels)
+            for name, state in self._states.items()
+        }
+
+    def _state(self, plan: OutputPlan) -> Callable[[Levels], WiredOutput]:
+        """Return a function that reads the state of an output, ignoring the motors' power."""
+        mixed = sum(one.rest * plan.mix.get(one.name, 0.0) for one in self.plan.actions)
+        rest = max(-1.0, min(1.0, plan.offset + mixed))
+        return OUTPUTS[plan.driver].wire(plan, rest, self._duty)
+
+    def _duty(self, levels: Levels, pin: int) -> float:
+        return levels.duties.get(pin, float(self.idle_level(pin)))
+
+
 class Interval(NamedTuple):
     """A time interval in which an output was not at rest."""
 
@@ -140,11 +209,8 @@ def unauthorised(
 ) -> list[Interval]:
     """Return when a propelling output was not at rest without permission.
 
-    Args:
-        ledger: Transitions, ordered by time.
-        wiring: Wiring of the robot.
-        permitted: Start and end of each time in which it may move, ns, such as from the arrival of
-            a command to its deadline.
+    `permitted` has the start and end of each time in which it may move, ns, such as from the
+    arrival of a command to its deadline. The `ledger` is ordered by time.
     """
     never = (math.inf, math.inf)
     permits = [*sorted(permitted), never]

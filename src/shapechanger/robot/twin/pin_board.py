@@ -30,8 +30,8 @@ from shapechanger.robot.drivers.simulation import (
 )
 from shapechanger.robot.hardware import ServoReply
 from shapechanger.robot.twin.camera import FrontCameraPipe
+from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.rpc import BoardConnection
-from shapechanger.robot.twin.wiring import TwinWiring
 
 # Longest step of the servos' time: after a longer delay of the board by a busy machine, their
 # watchdogs would release them although the guard is not silent.
@@ -53,16 +53,8 @@ class _Claim:
 class PinBoard:
     """Pins, chips, servos and world, for a robot's processes and its operator.
 
-    Args:
-        wiring: The attached parts; it determines the level of undriven pins.
-        ledger: File for the changes of outputs, unbuffered; None to keep none.
-        seed: Seed of the phase of software PWM.
-        clock: Returns the time, ns.
-
-    Attributes:
-        levels: State of all outputs.
-        stop_held: Whether the stop button is pressed; its level follows at the next `advance`.
-        dead_chips: Bus and address of the chips that do not answer.
+    The `ledger` gets the changes of outputs, unbuffered; None keeps none. The `seed` selects the
+    phase of software PWM, and `clock` returns the time, ns.
     """
 
     def __init__(
@@ -77,9 +69,9 @@ class PinBoard:
         self.clock = clock
         self.world = world
         self.camera = camera
-        self.levels = Levels()
-        self.stop_held = False
-        self.dead_chips: set[tuple[int, int]] = set()
+        self.levels = Levels()  # State of all outputs.
+        self.stop_held = False  # Whether the stop button is pressed, for the next `advance`.
+        self.dead_chips: set[tuple[int, int]] = set()  # Bus and address of silent chips.
         self._wiring = wiring
         self._ledger = ledger
         self._random = random.Random(f"phase {seed}")

@@ -80,24 +80,17 @@ _DRIVES: Final = (
 class DrivingWorld(World):
     """A vehicle in the room; see `World`.
 
-    Args:
-        parts: Parts that the robot's outputs move, such as "wheels".
-        size: Width and height of the frames in pixels.
-        seed: Seed of the stripes on the walls, and of the first start.
-        pitch_deg: Angle of the camera's axis below the horizon, degrees; None for level.
-        fovy_deg: Vertical field of view of the camera, degrees; None for 90 degrees across.
-
-    Raises:
-        RobotError: If the parts belong to vehicles of different kinds.
+    The robot's outputs move `parts`, such as "wheels", which belong to one kind of vehicle. The
+    `seed` selects the stripes on the walls, and the first start.
     """
 
     def __init__(
         self,
         parts: Collection[str],
-        size: tuple[int, int],
+        size: tuple[int, int],  # Width and height of the frames, pixels.
         seed: int,
-        pitch_deg: float | None = None,
-        fovy_deg: float | None = None,
+        pitch_deg: float | None = None,  # Camera's axis below the horizon; None for level.
+        fovy_deg: float | None = None,  # Vertical field of view; None for 90 degrees across.
     ) -> None:
         kinds = [one for one in _DRIVES if {*one.ahead, one.rudder} & set(parts)]
         if len(kinds) > 1:

@@ -107,24 +107,17 @@ def board_gone(_: OSError) -> RobotError:
 
 
 class BoardClient:
-    """A connection to the board, to be used by one thread.
-
-    Attributes:
-        clock: Kind of clock, "real" or "twin".
-        now_ns: Newest twin time that the board has sent; with the clock "real", an earlier time.
-        levels: Level of each pin that is claimed as an input.
-        watchers: Functions that `dispatch` calls with level and time of each edge, by pin.
-        while_held_up: Called every 10 ms while the board is held up and neither takes a request nor
-            replies to it, for 10 s at most.
-    """
+    """A connection to the board, to be used by one thread."""
 
     def __init__(self, path: str, role: Role) -> None:
         self._last_id = 0
         self._waits = 0  # Id of the "wait" without a reply; 0 for none.
         self._replies: dict[int, Reply] = {}
         self._edges: deque[Edge] = deque()
-        self.levels: dict[int, int] = {}
+        self.levels: dict[int, int] = {}  # Levels of the pins that are claimed as inputs.
+        # Functions that `dispatch` calls with level and time of each edge, keyed by pin.
         self.watchers: dict[int, Callable[[int, int], None]] = {}
+        # Called every 10 ms while the board neither takes a request nor replies to it.
         self.while_held_up: Callable[[], object] = lambda: None
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ExitStack() as undo:
@@ -162,14 +155,10 @@ class BoardClient:
         return self._replies.pop(call_id).decode(kind)
 
     def wait(self, until_ns: int = 0, at_most_s: float = 0.0) -> bool:
-        """Wait until the board reports edges, or advances twin time to the next tick.
-
-        Args:
-            until_ns: Time of the next grant, if no tick is earlier, ns.
-            at_most_s: Limit in real time, s.
+        """Wait until the board reports edges, or advances twin time to the next tick or `until_ns`.
 
         Returns:
-            Whether it did, which updates `now_ns` and `levels`.
+            Whether it did within `at_most_s` of real time, which updates `now_ns` and `levels`.
         """
         self._waits = self._waits or self._call("wait", until_ns)
         poll = select.poll()

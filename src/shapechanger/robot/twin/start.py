@@ -20,9 +20,9 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName, check_seed, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.twin.ledger import ONE_SHOT_MS, TwinWiring
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.rpc import BoardClient
-from shapechanger.robot.twin.wiring import ONE_SHOT_MS, TwinWiring
 
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
@@ -44,13 +44,9 @@ class Place:
 
 
 def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, seed: int) -> World:
-    """Open the world of a place.
+    """Open the world of a place, for a robot whose outputs move `parts`.
 
-    Args:
-        place: The place.
-        parts: Parts that the robot's outputs move.
-        camera: Camera of the profile; None without one.
-        seed: Seed of the surroundings and of the start.
+    The `seed` selects the surroundings and the start.
 
     Raises:
         UnknownName: If the module of the opener has no such function.

@@ -11,7 +11,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
@@ -37,21 +36,18 @@ FAILURES: Final = {
 class Driver(subprocess.Popen[bytes]):
     """The driving process; the end of a `with` block kills it.
 
-    Args:
-        robot: The robot.
-        within: Command prefix, such as one that enters a network namespace.
-        pilot: Module of a program that drives as a policy on board, which a person has to arm the
-            robot for; "" for this program.
+    It runs this program, or the module `pilot`, which drives as a policy on board does, and needs a
+    person who arms the robot for it.
     """
 
-    def __init__(self, robot: KnownRobot, within: Sequence[str] = (), *, pilot: str = "") -> None:
+    def __init__(self, robot: KnownRobot, *, pilot: str = "") -> None:
         self._folder = TemporaryDirectory(prefix="shapechanger-driver-")
         # Files and not pipes, which a driver that is never read would fill.
         files = [Path(self._folder.name, name) for name in ("address", "sent", "log")]
         address, self._sent, self._log = files
         address.write_bytes(msgspec.json.encode(robot))
         with address.open() as asked, self._sent.open("wb") as sent, self._log.open("wb") as log:
-            command = [*within, sys.executable, "-P", "-m", pilot or _PROGRAM]
+            command = [sys.executable, "-P", "-m", pilot or _PROGRAM]
             super().__init__(command, stdin=asked, stdout=sent, stderr=log)
 
     def __exit__(self, *_: object) -> None:

@@ -27,14 +27,9 @@ _STANDS_MPS: Final = 0.02
 
 
 def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[Finding]:
-    """Check a robot with its wheels off the ground, driven by a person.
+    """Check a robot with its wheels off the ground, driven by a person at a `cap` of 0 to 1.
 
     Each check begins in the state after the previous one.
-
-    Args:
-        robot: The running robot.
-        profile: Its profile.
-        cap: Largest throttle, 0 to 1.
     """
     propels = [action.propels for action in profile.actions]
     # Forward only: a tank's steering propels too.

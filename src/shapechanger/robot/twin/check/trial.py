@@ -27,6 +27,7 @@ from shapechanger.robot.twin.check.faults import FAULTS, BadNetwork, Fault, NotT
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.ledger import (
     Interval,
+    TwinWiring,
     propelled,
     read_ledger,
     time_to_rest,
@@ -35,7 +36,6 @@ from shapechanger.robot.twin.ledger import (
 from shapechanger.robot.twin.operator import Operator
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.robot.twin.start import BoardAt, start_board
-from shapechanger.robot.twin.wiring import TwinWiring
 
 # Longest low time of software PWM while a motor runs: two cycles at 50 Hz.
 _PWM_S: Final = 0.04
@@ -419,14 +419,8 @@ def check_robot(
 ) -> Iterator[tuple[str, Iterator[Finding]]]:
     """Yield each part of a level, and its findings, before its first question.
 
-    Nothing moves in the part "wiring"; all others drive outputs. Each ends at rest.
-
-    Args:
-        level: The level.
-        bench: The robot, and where it is.
-        standing: The robot for the checks without motion.
-        cap: Largest throttle of the checks that drive, 0 to 1.
-        trials: Trials of each fault.
+    Nothing moves in the part "wiring"; all others drive outputs. Each ends at rest. `cap`, 0 to 1,
+    is the largest throttle of "driving", and `trials` the number of trials of each fault.
     """
 
     def light_lamps() -> Iterator[Finding]:
