@@ -219,14 +219,12 @@ def _devices(robot: StandingRobot) -> Results:
 
 def _packages(profile: Profile) -> Results:
     plans = (*profile.outputs, *profile.sensors)
-    ours = "pip install 'shapechanger[robot]'"
-    venv = "make the virtual environment with --system-site-packages"
     for name, is_needed, remedy in (
-        ("gpiozero", True, ours),
-        ("lgpio", True, "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"),
-        ("smbus2", any("bus" in plan.settings for plan in plans), ours),
+        ("gpiozero", True, "pip install 'shapechanger[robot]'"),
+        ("lgpio", True, "pip install lgpio, or `sudo apt install python3-lgpio`"),
+        ("smbus2", any("bus" in plan.settings for plan in plans), "pip install smbus2"),
         ("dynamixel_sdk", servo_devices(profile), "pip install 'shapechanger[robot,finger]'"),
-        ("picamera2", has_ribbon(profile), f"sudo apt install python3-picamera2, and {venv}"),
+        ("picamera2", has_ribbon(profile), "it needs a venv with --system-site-packages"),
     ):
         if is_needed:
             is_there = importlib.util.find_spec(name) is not None

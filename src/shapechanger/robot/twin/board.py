@@ -22,7 +22,7 @@ from typing import Any, Final, Literal, get_origin, get_type_hints
 import msgspec
 
 from shapechanger.contract.plan import GuardPlan
-from shapechanger.errors import RobotError, ShapechangerError, translate_errors
+from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.guard.running import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.ledger import TwinWiring
@@ -58,11 +58,7 @@ def _served(function: Callable[..., object]) -> Callable[[BoardConnection, msgsp
     decode: Any = msgspec.msgpack.Decoder(tuple[*kinds]).decode
 
     def run(caller: BoardConnection, arguments: msgspec.Raw) -> object:
-        with translate_errors(
-            msgspec.MsgspecError,
-            to=lambda error: RobotError(f"Wrong arguments of {function.__name__}: {error}."),
-        ):
-            given = dict(zip(hints, decode(arguments), strict=True))
+        given = dict(zip(hints, decode(arguments), strict=True))
         return function(**given, **({"caller": caller} if takes_caller else {}))
 
     return run

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 import os
+import pkgutil
 import select
 import socket
 import subprocess
@@ -18,7 +18,7 @@ import msgspec
 
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import World
-from shapechanger.errors import RobotError, UnknownName, check_seed, translate_errors
+from shapechanger.errors import RobotError, check_seed
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.twin.ledger import ONE_SHOT_MS, TwinWiring
 from shapechanger.robot.twin.room import DrivingWorld
@@ -49,26 +49,13 @@ def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, 
     The `seed` selects the surroundings and the start.
 
     Raises:
-        UnknownName: If the module of the opener has no such function.
-        RobotError: If there is no such module.
+        ImportError: If the module of the opener is not installed.
         ShapechangerError: If the opener refuses its arguments or the robot, or needs an extra.
     """
     if not place.opener:
         plan = camera or CameraPlan("")
         return DrivingWorld(parts, plan.size, seed, plan.pitch_deg, plan.fovy_deg)
-    module, _, name = place.opener.partition(":")
-    with translate_errors(
-        ModuleNotFoundError,
-        to=lambda error: RobotError(
-            f"The world of this twin is opened by {place.opener}, and there is no "
-            f"{error.name}: install the package that names it."
-        ),
-    ):
-        found = importlib.import_module(module)
-    if not hasattr(found, name):
-        known = [other for other in vars(found) if other.startswith("open_")]
-        raise UnknownName(f"function of {module} that opens a world", name, known)
-    return getattr(found, name)(parts, camera, seed, **place.arguments)
+    return pkgutil.resolve_name(place.opener)(parts, camera, seed, **place.arguments)
 
 
 class BoardSettings(msgspec.Struct, frozen=True):

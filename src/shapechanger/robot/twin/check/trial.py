@@ -51,10 +51,7 @@ class Watcher:
         """Return whether an output that propels is driven now; None if that is not measured."""
 
     def rest_ms(self, at_ns: int) -> float:
-        """Return the time from a moment to the last propulsion after it, ms.
-
-        It is infinite if the propulsion goes on, and NaN if it is not measured.
-        """
+        """Return the time to the last propulsion, ms; infinite if it goes on, NaN if unknown."""
         del at_ns
         return math.nan
 
@@ -84,10 +81,7 @@ class _BoardWatcher(Watcher):
 
 
 class _ProbeWatcher(Watcher):
-    """Watches the pin `probed` of a motor through a wire to the free pin `probe`.
-
-    Edges are stamped here when they arrive, about a millisecond late.
-    """
+    """Watches a motor's pin through a wire to a free pin, about a millisecond late."""
 
     def __init__(self, probe: int, probed: int, hardware: Hardware) -> None:
         self._probed = probed
