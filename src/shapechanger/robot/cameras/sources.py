@@ -9,7 +9,6 @@ import stat
 import subprocess
 import time
 from contextlib import suppress
-from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
 from typing import Final
@@ -57,7 +56,6 @@ class Pipe(Camera):
 
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`. Bytes between frames are skipped."""
-        skipped = self._splitter.skipped
         while (jpeg := self._splitter.next()) is None:
             self._await_data()
         left = _MOST_WAITING
@@ -70,8 +68,7 @@ class Pipe(Camera):
             left -= len(waiting)
         captured_ns = captured_ns_of(jpeg)
         at_ns = time.monotonic_ns() if captured_ns is None else captured_ns
-        frame = checked_frame(jpeg, at_ns, self.plan)
-        return replace(frame, skipped=self._splitter.skipped - skipped)
+        return checked_frame(jpeg, at_ns, self.plan)
 
     def close(self) -> None:
         """Interrupt a waiting `read`, and end the program."""

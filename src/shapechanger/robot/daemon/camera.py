@@ -66,7 +66,6 @@ class FrameReader:
         self._deliver = deliver
         self._report = report
         self._trouble = ""
-        self._skips = False
         self._end = threading.Event()
         self._camera: Camera | None = None
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
@@ -103,12 +102,6 @@ class FrameReader:
                         continue
                     good, bad = True, 0
                     self._deliver(frame)
-                    if frame.skipped and not self._skips:
-                        self._skips = True  # Some streams have bytes between all frames.
-                        self._report(
-                            f"The camera's stream has bytes between its frames that are no JPEG, "
-                            f"{frame.skipped} before this one: they are skipped."
-                        )
                     if self._trouble:
                         self._trouble = ""
                         self._report("The camera works again.")

@@ -43,18 +43,10 @@ class Listener:
     """
 
     def __init__(
-        self,
-        protocol: Callable[[], asyncio.Protocol],
-        tls: ssl.SSLContext | None,
-        max_total: int = _MAX_TOTAL,
-        max_per_address: int = _MAX_PER_ADDRESS,
-        timeout_s: float = _PRE_AUTH_TIMEOUT_S,
+        self, protocol: Callable[[], asyncio.Protocol], tls: ssl.SSLContext | None
     ) -> None:
         self._protocol = protocol
         self._tls = tls
-        self._max_total = max_total
-        self._max_per_address = max_per_address
-        self._timeout_s = timeout_s
         self._sockets = contextlib.ExitStack()
         self._tasks: list[asyncio.Task[None]] = []
         self._waiting: dict[Hashable, AcceptedSocket] = {}  # Oldest first.
@@ -91,12 +83,12 @@ class Listener:
         for other in [k for k, known in self._waiting.items() if known.is_gone]:
             self.remove(other)
         here = [k for k, c in self._waiting.items() if c.address == connection.address]
-        if len(here) >= self._max_per_address:
+        if len(here) >= _MAX_PER_ADDRESS:
             self._drop(here[0])
-        elif len(self._waiting) >= self._max_total:
+        elif len(self._waiting) >= _MAX_TOTAL:
             self.drop_one()
         loop = asyncio.get_running_loop()
-        connection.timer = loop.call_later(self._timeout_s, self._drop, key)
+        connection.timer = loop.call_later(_PRE_AUTH_TIMEOUT_S, self._drop, key)
         self._waiting[key] = connection
 
     def renew(self, key: Hashable) -> None:
@@ -187,7 +179,6 @@ class AcceptedSocket:
 
 
 _SHUTDOWN_S: Final = 0.2  # Short, because no messages remain to be sent.
-_GUARD_SILENT_NS: Final = 1_000_000_000
 _CONSOLE: Final = "/console/"
 
 _HEADERS: Final = {
@@ -256,7 +247,6 @@ class Server:
         for name, file in files.items():
             app.router.add_get(f"{_CONSOLE}{name}", partial(_serve_file, *file))
         app.router.add_get(f"{_CONSOLE}robot.json", self._robot)
-        app.router.add_get("/healthz", self._health)
         app.router.add_get("/link", self._link)
         return app
 
@@ -287,14 +277,6 @@ class Server:
                 "open": self._authenticator.is_open,
             }
         )
-
-    async def _health(self, _: web.Request) -> web.Response:
-        at_ns = self._hub.state.at_ns
-        heard = at_ns and self._hub.now_ns() - at_ns <= _GUARD_SILENT_NS
-        # A twin's time stands still while no client drives, and its guard is silent then.
-        if heard or self._hub.in_steps:
-            return web.json_response({"guard": "well"})
-        return web.json_response({"guard": "silent"}, status=503)
 
     async def _link(self, request: web.Request) -> web.StreamResponse:
         refusal = origin_refusal(
