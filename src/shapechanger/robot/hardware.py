@@ -10,7 +10,7 @@ import importlib
 import select
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Final, NamedTuple, Protocol
+from typing import Any, ClassVar, Final, NamedTuple
 
 from shapechanger.errors import RobotError, translate_errors
 
@@ -68,27 +68,6 @@ class Clock:
         await asyncio.sleep(seconds)
 
 
-class I2cBus(Protocol):
-    """Methods of `smbus2.SMBus` that the drivers use.
-
-    In all of them, `i2c_addr` is the address of the chip and `register` the number of its (first)
-    register; a `value` is one byte, and a `length` a number of bytes.
-    """
-
-    def write_byte(self, i2c_addr: int, value: int) -> None:
-        """Send one byte to a chip without registers."""
-
-    def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
-        """Read consecutive registers."""
-        ...
-
-    def write_i2c_block_data(self, i2c_addr: int, register: int, data: Sequence[int]) -> None:
-        """Write consecutive registers, one byte each."""
-
-    def close(self) -> None:
-        """Close the bus."""
-
-
 class ServoReply(NamedTuple):
     """Reply of a servo.
 
@@ -138,8 +117,12 @@ class Hardware:
                 self._pin_factory = LowAtOnceFactory()
         return self._pin_factory
 
-    def i2c(self, bus: int) -> I2cBus:
-        """Open the I2C bus of a number, with smbus2."""
+    def i2c(self, bus: int) -> Any:
+        """Open the I2C bus of a number, with smbus2.
+
+        The drivers use `write_byte`, `read_i2c_block_data`, `write_i2c_block_data` and `close` of
+        `smbus2.SMBus`.
+        """
         from smbus2 import SMBus
 
         return SMBus(bus)

@@ -22,7 +22,6 @@ from shapechanger.robot.guard.running import (
     plan_fd,
     read_plan_fd,
     run_normally,
-    supervisor_command,
 )
 from tests.robot.guard.plans import car
 
@@ -60,7 +59,6 @@ def test_wrong_arguments_are_refused(arguments: list[str]) -> None:
 
 def test_processes_ignore_the_working_folder() -> None:
     assert command_of("guard", _PLAN) == [sys.executable, "-I", start.__file__, "guard"]
-    assert supervisor_command(_PLAN, 7)[1:] == ["-I", start.__file__, "supervise", "--plan-fd", "7"]
     assert command_of("daemon", _PLAN)[1:] == ["-P", "-m", "shapechanger.robot.daemon.process"]
 
 

@@ -23,7 +23,7 @@ from shapechanger.errors import (
 )
 from shapechanger.robot.check.pins import require_pins
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard.running import plan_fd, supervisor_command
+from shapechanger.robot.guard.running import command_of, plan_fd
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import Service, require_free
@@ -74,7 +74,8 @@ class RobotServe(Service):
                     self.make_known(profile.name, plan, port, say)
                 sys.stdout.flush()
             # Replaces this process, which has loaded much that a supervisor does not need.
-            os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
+            command = [*command_of("supervise", plan), "--plan-fd", str(plan_fd(plan))]
+            os.execv(plan.python, command)
 
     def _refuse_contradictions(self) -> None:
         """Refuse options that only apply to a twin."""

@@ -53,7 +53,7 @@ def encoded_frame(image: NDArray[np.uint8], captured_ns: int, plan: CameraPlan) 
     jpeg = simplejpeg.encode_jpeg(
         np.ascontiguousarray(image), plan.jpeg_quality, colorsubsampling="420"
     )
-    return Frame(jpeg, captured_ns, encoded_here=True)
+    return Frame(jpeg, captured_ns)
 
 
 def _require_size(width: int, height: int, plan: CameraPlan) -> None:

@@ -105,20 +105,10 @@ class Pipe(Camera):
         return None
 
     def _await_data(self) -> None:
-        if self._fd < 0:
-            self._open()
         self.wait(self._fd)
-        data = self._waiting()
-        if data is None:
-            return  # Another reader of the pipe took the data.
-        if not data:
-            # The next read reopens the pipe and waits for its next writer.
-            self._splitter = JpegSplitter()
-            if self._program is None and self._live:
-                os.close(self._fd)
-                self._fd = -1
+        if (data := self._waiting()) == b"":
             raise RobotError(f"The stream of {self._path} has ended.")
-        self._splitter.feed(data)
+        self._splitter.feed(data or b"")  # Another reader of the pipe may have taken the data.
 
 
 class Folder(Camera):

@@ -32,13 +32,12 @@ class FrameChecks:
 
     def refusal(self, frame: Frame) -> str:
         """Return the reason to reject a frame, or "" if it is valid and new."""
-        if not frame.encoded_here:
-            try:
-                # The driver has checked the header. Strict rejects missing data, which a decoder
-                # would otherwise fill with grey.
-                simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
-            except ValueError as error:
-                return f"The camera sent a JPEG that cannot be decoded: {error}."
+        try:
+            # The driver has checked the header. Strict rejects missing data, which a decoder would
+            # otherwise fill with grey.
+            simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
+        except ValueError as error:
+            return f"The camera sent a JPEG that cannot be decoded: {error}."
         # Sensor noise makes frames differ, so the same bytes are never a new frame.
         if frame.jpeg == self._last:
             return "The camera repeats the same frame."

@@ -43,10 +43,18 @@ class Listener:
     """
 
     def __init__(
-        self, protocol: Callable[[], asyncio.Protocol], tls: ssl.SSLContext | None
+        self,
+        protocol: Callable[[], asyncio.Protocol],
+        tls: ssl.SSLContext | None,
+        max_total: int = _MAX_TOTAL,
+        max_per_address: int = _MAX_PER_ADDRESS,
+        timeout_s: float = _PRE_AUTH_TIMEOUT_S,
     ) -> None:
         self._protocol = protocol
         self._tls = tls
+        self._max_total = max_total
+        self._max_per_address = max_per_address
+        self._timeout_s = timeout_s
         self._sockets = contextlib.ExitStack()
         self._tasks: list[asyncio.Task[None]] = []
         self._waiting: dict[Hashable, AcceptedSocket] = {}  # Oldest first.
@@ -83,12 +91,12 @@ class Listener:
         for other in [k for k, known in self._waiting.items() if known.is_gone]:
             self.remove(other)
         here = [k for k, c in self._waiting.items() if c.address == connection.address]
-        if len(here) >= _MAX_PER_ADDRESS:
+        if len(here) >= self._max_per_address:
             self._drop(here[0])
-        elif len(self._waiting) >= _MAX_TOTAL:
+        elif len(self._waiting) >= self._max_total:
             self.drop_one()
         loop = asyncio.get_running_loop()
-        connection.timer = loop.call_later(_PRE_AUTH_TIMEOUT_S, self._drop, key)
+        connection.timer = loop.call_later(self._timeout_s, self._drop, key)
         self._waiting[key] = connection
 
     def renew(self, key: Hashable) -> None:

@@ -383,7 +383,7 @@ SENSORS: Final = Chips(
     mpu6050="mpu6050:MPU6050",
     ina219="ina219:INA219",
     cpu_temperature="cpu_temperature:CPU_TEMPERATURE",
-    bus_servo="servos.output:TENDONS",
+    bus_servo="servos.bus:TENDONS",
     as5600="as5600:AS5600",
 )
 """Kinds of sensors."""
@@ -394,7 +394,7 @@ OUTPUTS: Final = Chips(
     phase_enable="motors:PHASE_ENABLE",
     servo="pulse:SERVO",
     esc="pulse:ESC",
-    bus_servo="servos.output:BUS_SERVO",
+    bus_servo="servos.bus:BUS_SERVO",
 )
 """Kinds of outputs."""
 

@@ -89,11 +89,6 @@ def command_of(program: Literal["supervise", "guard", "daemon"], plan: ServePlan
     return [plan.python, "-I", str(Path(start.__file__).resolve()), program]
 
 
-def supervisor_command(plan: ServePlan, fd: int) -> list[str]:
-    """Return the command line of the supervisor."""
-    return [*command_of("supervise", plan), "--plan-fd", str(fd)]
-
-
 def read_plan_fd(fd: int) -> ServePlan:
     """Read the plan without moving the file position, so that several processes can."""
     data = b""
