@@ -1,6 +1,5 @@
 """Fingers on a device do what CPU envs do, whatever their motors, tendons, delays and paths."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -8,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
 import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
@@ -15,7 +15,7 @@ from shapechanger.envs.warp.devices import as_torch
 from shapechanger.errors import FingerError, UnknownName, VectorEnvError
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
-from shapechanger.finger.paths import from_callable
+from shapechanger.finger.paths import FingertipPath
 from shapechanger.finger.plant import JointVelocities
 from shapechanger.finger.postures import draw_posture, draw_start
 from shapechanger.finger.reach import FingerReachEnv
@@ -26,9 +26,9 @@ from tests.envs.warp.side_by_side import OBSERVATION_TOLERANCE, REWARD_TOLERANCE
 ROUNDS = 3
 
 
-def sway(t: float) -> tuple[float, float, float]:
-    """Return a point of an open path, m."""
-    return 0.05, 0.01 * math.sin(3.0 * t), -0.045
+def sway(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points of an open path, m, (n, 3)."""
+    return np.column_stack([np.full_like(t, 0.05), 0.01 * np.sin(3.0 * t), np.full_like(t, -0.045)])
 
 
 def drawn(count: int, gap: str = "wide") -> list[FingerParameters]:
@@ -65,7 +65,10 @@ KINDS: dict[str, tuple[list[Any], dict[str, Any]]] = {
     "path of lengths": ([{"path": QUANTISED}, {"path": PATH}], {"actions": "length"}),
     "rigs": (drawn(4), {}),
     "circles": ([None, OTHER], {"task": "FingerTrack"}),
-    "open paths": (drawn(2), {"task": "FingerTrack", "path": from_callable(sway, 1.0)}),
+    "open paths": (
+        drawn(2),
+        {"task": "FingerTrack", "path": FingertipPath(sway, 1.0, closed=False)},
+    ),
 }
 
 

@@ -157,8 +157,9 @@ def figure_eight(
     hz: float = 0.5,
     normal: Vector = _RADIAL,
     phase: float = 0.0,
+    depth: float = 0.0,
 ) -> FingertipPath:
-    """Return a horizontal figure eight: the lemniscate of Gerono.
+    """Return a horizontal figure eight: the lemniscate of Gerono, which may leave its plane.
 
     It begins at its crossing, towards its distal loop. Seen against `normal`, it runs clockwise
     around the distal loop and counter-clockwise around the other.
@@ -166,18 +167,21 @@ def figure_eight(
     Args:
         size: Its length along x, or as near to x as its plane allows, m, above 0; it is half as
             wide.
-        centre: Place of the crossing, m, in the finger's frame.
+        centre: Its middle, m, in the finger's frame.
         hz: Periods per second, above 0; one period covers both loops.
         normal: Normal of its plane, of any length except 0.
         phase: Phase at 0 s, rad.
+        depth: Its extent along `normal`, m: both loops are bent by half of it towards `normal`,
+            and the crossing away. By default it is flat.
 
     Raises:
         PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
     """
     size = _number("The size of a figure eight", size, 0.0)
-    along, across, _ = _axes(normal)
+    depth = _number("The depth of a figure eight", depth)
+    along, across, out = _axes(normal)
     sines = [size / 2.0 * along, size / 4.0 * across]
-    return _closed("figure eight", hz, phase, centre, [np.zeros(3)] * 2, sines)
+    return _closed("figure eight", hz, phase, centre, [np.zeros(3), -depth / 2.0 * out], sines)
 
 
 def line(
@@ -201,38 +205,6 @@ def line(
         raise PathError(f"A line must end elsewhere than it starts, got {start!r} twice.")
     middle = first / 2.0 + last / 2.0
     return _closed("line", hz, 0.0, tuple(middle), [first - middle], [np.zeros(3)])
-
-
-def curve_3d(
-    size: float = 0.024,
-    depth: float = 0.008,
-    centre: Vector = _CENTRE,
-    hz: float = 0.5,
-    normal: Vector = _RADIAL,
-    phase: float = 0.0,
-) -> FingertipPath:
-    """Return a figure eight bent out of its plane: a three-dimensional Lissajous curve.
-
-    Compared with `figure_eight`, both loops are bent towards `normal`, and the crossing away.
-
-    Args:
-        size: Its length along x, or as near to x as its plane allows, m, above 0; it is half as
-            wide.
-        depth: Its extent along `normal`, m, above 0: half of it to each side.
-        centre: The middle, m, in the finger's frame.
-        hz: Periods per second, above 0; one period covers both loops.
-        normal: Normal of the plane out of which it is bent, of any length except 0.
-        phase: Phase at 0 s, rad.
-
-    Raises:
-        PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
-    """
-    size = _number("The size of a curve", size, 0.0)
-    depth = _number("The depth of a curve", depth, 0.0)
-    along, across, out = _axes(normal)
-    sines = [size / 2.0 * along, size / 4.0 * across]
-    cosines = [np.zeros(3), -depth / 2.0 * out]
-    return _closed("curve", hz, phase, centre, cosines, sines)
 
 
 def _number(name: str, value: Any, above: float = -math.inf) -> float:
@@ -293,87 +265,44 @@ def _closed(
     return path
 
 
-def from_callable(
-    function: Callable[[float], ArrayLike],
-    duration_s: float | None = None,
-    period_s: float | None = None,
-) -> FingertipPath:
-    """Create a path from a function of time.
+# Time in which a function is checked, s, and the number of steps in it.
+_TRIAL_S: Final = 10.0
+_TRIALS: Final = 5000
 
-    The function is sampled 500 times per second, at most 10 000 times, and more densely where it is
-    least smooth. This finds jumps of 0.01 mm, except in rough functions.
+
+def from_callable(function: Callable[[float], ArrayLike]) -> FingertipPath:
+    """Create an endless path from a function of time.
 
     Args:
-        function: Maps a time in s, from 0 to the end, to x, y and z in the finger's frame, m. It
-            must be deterministic.
-        duration_s: End of the path, s, above 0; the point rests there afterwards.
-        period_s: Period, s, above 0; the point must be back after it, within 0.1 mm. Give only one
-            of the two; without either, the path is endless, and its first 10 s are checked.
+        function: Maps a time in s, from 0 on, to x, y and z in the finger's frame, m. It must be
+            deterministic. Its first 10 s are checked at 500 points per second.
 
     Raises:
-        PathError: If the function does not return three finite numbers, jumps, is faster than
-            `FASTEST_MPS`, or is not back after `period_s`; if a time is not a finite number above
-            0, or both are given.
+        PathError: If the function does not return three finite numbers, or jumps or is faster than
+            `FASTEST_MPS` from one of these points to the next.
     """
-    if duration_s is not None and period_s is not None:
-        raise PathError(
-            "A path ends after duration_s or repeats after period_s; give only one of them."
-        )
-    length = math.inf
-    for name, given in (("duration_s", duration_s), ("period_s", period_s)):
-        length = length if given is None else _number(name, given, 0.0)
-    _require_continuous(function, 10.0 if math.isinf(length) else length)
-    if period_s is not None:
-        apart = math.dist(_point(function, 0.0), _point(function, length))
-        if apart > CLOSED_M:
-            raise PathError(
-                f"After its period of {length:.6g} s the path is {apart * 1e3:.3g} mm from its "
-                f"beginning, and {CLOSED_M * 1e3:g} mm are allowed: give another period_s, or "
-                "duration_s for an open path."
-            )
-    return FingertipPath(partial(_points, function), length, closed=period_s is not None)
+    path = FingertipPath(partial(_points, function), math.inf, closed=False)
+    times = np.linspace(0.0, _TRIAL_S, _TRIALS + 1)
+    points = path.at(times)
+    for i, t in enumerate(times[:-1]):
+        where = f"At {t:.6g} s the path jumps"
+        _require_slow(where, points[i], points[i + 1], _TRIAL_S / _TRIALS)
+    return path
 
 
 def _points(function: Callable[[float], ArrayLike], t: Array) -> Array:
     """Return the positions of a function of one time."""
-    return np.array([_point(function, float(now)) for now in t]).reshape(-1, 3)
-
-
-def _point(function: Callable[[float], ArrayLike], t: float) -> Array:
-    given = function(t)
-    point = as_numbers(given)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise PathError(
-            "The function of a path must return three finite numbers (x, y, z) in m, and at "
-            f"{t:.6g} s it returned {given!r}."
-        )
-    return point
-
-
-def _require_continuous(function: Callable[[float], ArrayLike], length: float) -> None:
-    """Check the first seconds of a function for jumps: only a jump does not shrink by bisection."""
-    n = round(min(max(length * 500.0, 200), 10_000))
-    times = np.linspace(0.0, length, n + 1)
-    points = _points(function, times)
-    with np.errstate(over="ignore", invalid="ignore"):
-        steps = np.diff(points, axis=0)
-        around = np.vstack([steps[:1], steps, steps[-1:]])
-        roughness = np.linalg.norm(steps - (around[:-2] + around[2:]) / 2.0, axis=1)
-        fastest = int(np.argmax(np.linalg.norm(steps, axis=1)))
-    # Bisect the fastest and the roughest intervals, down to a microsecond.
-    for i in (fastest, *np.argsort(roughness)[-16:].tolist()):
-        start, end = float(times[i]), float(times[i + 1])
-        first, last = _point(function, start), _point(function, end)
-        while True:
-            _require_slow(f"At {start:.6g} s the path jumps", first, last, end - start)
-            middle = start / 2.0 + end / 2.0
-            if end - start < 1e-6 or not start < middle < end:
-                break
-            between = _point(function, middle)
-            if math.dist(first, between) > math.dist(between, last):
-                end, last = middle, between
-            else:
-                start, first = middle, between
+    found: list[Array] = []
+    for now in t.tolist():
+        given = function(now)
+        point = as_numbers(given)
+        if point.shape != (3,) or not np.isfinite(point).all():
+            raise PathError(
+                "The function of a path must return three finite numbers (x, y, z) in m, and at "
+                f"{now:.6g} s it returned {given!r}."
+            )
+        found.append(point)
+    return np.array(found).reshape(-1, 3)
 
 
 def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
@@ -395,54 +324,41 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
             The message names the line.
     """
     name = os.fspath(path)
-    where, table = _rows(name)
-    times, points = table[:, 0] - table[0, 0], table[:, 1:]
-    steps = np.diff(table[:, 0])
-    median = float(np.median(steps))
-    for i, (step, place) in enumerate(zip(steps.tolist(), where[1:], strict=True)):
-        if step <= 0.0:
-            raise PathError(
-                f"{place}: time must increase, from {table[i, 0]!s} s to {table[i + 1, 0]!s} s."
-            )
-        if step > 5.0 * median:
-            raise PathError(
-                f"{place}: the time step of {step:.3g} s is a gap: the median is {median:.3g} s, "
-                "and 5 times as much is allowed."
-            )
-        _require_slow(place, points[i], points[i + 1], float(times[i + 1] - times[i]))
-    closed = math.dist(points[0], points[-1]) <= CLOSED_M
-    if closed:
-        points[[0, -1]] = (points[0] + points[-1]) / 2.0
-    spline = CubicSpline(times, points, bc_type="periodic" if closed else "natural")
-    return FingertipPath(cast("Any", spline), float(times[-1]), closed)
-
-
-def _rows(name: str) -> tuple[list[str], Array]:
-    """Return the file and line of each row, and the rows of t, x, y and z, (n, 4)."""
     try:
-        text = read_text(Path(name))
-    except (OSError, ValueError) as error:
+        reader = csv.reader(io.StringIO(read_text(Path(name)), newline=""), strict=True)
+        lines = [(f"{name}, line {reader.line_num}", cells) for cells in reader if cells]
+    except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", error)
         raise PathError(f"{name} cannot be read: {reason}.") from error
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        found = [(f"{name}, line {reader.line_num}", cells) for cells in reader if cells]
-    except csv.Error as error:
-        raise PathError(f"{name}, line {reader.line_num}, is not valid CSV: {error}.") from error
-    header = [cell.strip() for cell in found[0][1]] if found else []
+    header = [cell.strip() for cell in lines[0][1]] if lines else []
     if sorted(header) != ["t", "x", "y", "z"]:
         raise PathError(
             f"{name} names the columns {', '.join(header) or 'none'} in its first line: they must "
             "be t, x, y and z."
         )
-    for where, cells in found[1:]:
+    for where, cells in lines[1:]:
         numbers = as_numbers(cells)
         if numbers.shape != (4,) or not np.isfinite(numbers).all():
             raise PathError(f"{where}: four finite numbers are due, got {','.join(cells)!r}.")
-    if len(found) < 4:  # A spline of two rows would be a line.
-        raise PathError(f"{name} has too few rows: {len(found) - 1}, and a path needs 3.")
-    table = np.array([cells for _, cells in found[1:]], np.float64)
-    return [where for where, _ in found[1:]], table[:, [header.index(c) for c in "txyz"]]
+    if len(lines) < 4:  # A spline of two rows would be a line.
+        raise PathError(f"{name} has too few rows: {len(lines) - 1}, and a path needs 3.")
+    table = np.array([cells for _, cells in lines[1:]], np.float64)
+    table = table[:, [header.index(column) for column in "txyz"]]
+    times, points = table[:, 0] - table[0, 0], table[:, 1:]
+    steps = np.diff(table[:, 0])
+    longest = 5.0 * float(np.median(steps))
+    for i, (step, (where, _)) in enumerate(zip(steps.tolist(), lines[2:], strict=True)):
+        if not 0.0 < step <= longest:
+            raise PathError(
+                f"{where}: time must increase, by at most five times the median step; here it goes "
+                f"from {table[i, 0]!s} s to {table[i + 1, 0]!s} s."
+            )
+        _require_slow(where, points[i], points[i + 1], float(times[i + 1] - times[i]))
+    closed = math.dist(points[0], points[-1]) <= CLOSED_M
+    if closed:
+        points[[0, -1]] = (points[0] + points[-1]) / 2.0
+    spline = CubicSpline(times, points, bc_type="periodic" if closed else "natural")
+    return FingertipPath(cast("Any", spline), float(times[-1]), closed)
 
 
 PathSource = FingertipPath | str | PurePath | Mapping[str, Any] | Callable[[float], ArrayLike]
@@ -452,7 +368,7 @@ _SHAPES: Final[dict[str, Callable[..., FingertipPath]]] = {
     "circle": circle,
     "figure-eight": figure_eight,
     "line": line,
-    "curve": curve_3d,
+    "curve": partial(figure_eight, depth=0.008),
 }
 
 KINDS: Final = tuple(_SHAPES)
