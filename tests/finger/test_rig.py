@@ -30,7 +30,7 @@ _STIFFNESS = 20e3
 
 
 def _senses_of(profile: Profile) -> RigSenses:
-    return RigSenses("it", profile.action_layout(), profile.state_layout(), _STIFFNESS)
+    return RigSenses("it", profile.action_layout(), profile.state_layout())
 
 
 def _senses() -> RigSenses:

@@ -20,7 +20,7 @@ from shapechanger.envs.opengl import choose_gl, require_screen
 from shapechanger.envs.renderer import Renderer, body_reach, draw
 from shapechanger.errors import FingerError, UnknownName, check_seed
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
-from shapechanger.finger.gap import Gap, geared_around, require_balance, resolve_gap, with_gears
+from shapechanger.finger.gap import Gap, geared_around, resolve_gap, with_gears
 from shapechanger.finger.model import TARGET, FingerFigure
 from shapechanger.finger.parameters import (
     NOMINAL,
@@ -32,7 +32,7 @@ from shapechanger.finger.parameters import (
 from shapechanger.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.finger.postures import draw_start
 from shapechanger.finger.task import FingerSenses, FingertipReward
-from shapechanger.finger.tensions import drive_of
+from shapechanger.finger.tensions import drive_of, spans_all_torques
 from shapechanger.finger.visuals import tendon_legend
 from shapechanger.layout import Element, Feature, Layout
 
@@ -359,6 +359,9 @@ def as_finger(value: FingerLike | None) -> FingerParameters:
         given = NOMINAL.replace(**named)
     if not isinstance(given, FingerParameters):
         raise FingerError(f"Parameters of a finger must be numbers or JSON, got {given!r}.")
-    if given not in PARAMETER_SETS.values():
-        require_balance(given)
+    if given not in PARAMETER_SETS.values() and not spans_all_torques(given.arms):
+        raise FingerError(
+            "The tendons cannot balance the joints: there is a torque that no tensions give with "
+            "these moment arms, because tendons only pull."
+        )
     return given

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, UnknownName
-from shapechanger.finger.anatomy import JOINTS
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters, converted
-from shapechanger.finger.tensions import spans_all_torques, tensions_for_torque
+from shapechanger.finger.tensions import spans_all_torques
 
 # Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
 # two hundred with arm errors of 25 %.
@@ -23,8 +22,6 @@ _TRIES: Final = 1000
 # Parameters that are drawn by their logarithm.
 _LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"})
 
-# Torque that the tendons must give each joint alone, N·m.
-_BALANCE_NM: Final = 0.01
 # Relative errors of identified arms and stretch, and of joints: `benchmarks.finger_identify`.
 _FOUND: Final = 0.03
 _JOINTS_FOUND: Final = 0.2
@@ -217,26 +214,6 @@ def geared_around(found: FingerParameters) -> Gap:
         tension_noise=(found.tension_noise, found.tension_noise),
         least_tension=(found.least_tension, found.least_tension),
     )
-
-
-def require_balance(parameters: FingerParameters) -> None:
-    """Require tendons that can pull against one another at every joint of a finger.
-
-    Raises:
-        FingerError: If there is a torque that no tensions give; the message names the joint.
-    """
-    arms = parameters.arms
-    if spans_all_torques(arms):
-        return
-    for j, joint in enumerate(JOINTS):
-        for sign, way in ((1.0, "positive"), (-1.0, "negative")):
-            torque = sign * _BALANCE_NM * np.eye(len(JOINTS))[j]
-            if not tensions_for_torque(arms, torque, 0.0, np.inf)[1]:
-                raise FingerError(
-                    f"The tendons cannot balance {joint}: no tensions give it a {way} torque "
-                    "without one at another joint."
-                )
-    raise FingerError("The tendons cannot balance the joints: change the moment arms.")
 
 
 def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:

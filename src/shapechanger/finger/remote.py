@@ -27,7 +27,6 @@ from shapechanger.finger.task import FingerSenses
 from shapechanger.finger.track import FingerTrackEnv
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.client.known_robots import KNOWN_ROBOT
-from shapechanger.robot.link.messages import Pace
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
 
@@ -40,6 +39,7 @@ _START_OFF_RAD: Final = 0.03
 _START_S: Final = 1.0
 # Time for the pretension to wind in slack, s.
 _SLACK_S: Final = 0.6
+# Silence after which the link is lost, s; the clock of an own twin waits for a busy machine.
 _TIMEOUT_S: Final = 2.0
 _OWN_TIMEOUT_S: Final = 30.0
 # Prefixes of infos that concern driving only.
@@ -57,16 +57,10 @@ class RigMixin(FingerEnv):
         robot: Name of a known rig, or its address as HOST or HOST:PORT. A twin of the profile
             "finger" that is served on this machine is known under that name.
         task: Arguments of the task's own env.
-        pace: As for `RemoteVehicleEnv`; None for "lockstep" with a twin's own clock, else
-            "realtime".
         twin: A twin that this env serves itself instead of connecting to `robot`: "nominal", or the
             name of the gap that its finger is drawn from; "" for none.
         finger_seed: Seed of the finger drawn from that gap; 0 if not given.
-        tendon_stiffness: Stiffness of the rig's tendons, N/m, to correct lengths for their stretch.
-            The default is the twin's.
         twin_folder: Folder of a twin on this machine, for its true state; "" for none.
-        timeout_s: Silence of the rig after which the link is lost, s; None for 2 s, or 30 s with
-            its own twin, whose clock waits for a busy machine.
         actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
         **more: `reward`, `render_mode` (of the finger as measured), `width` and `height` of
             `FingerEnv`; `key` and `fingerprint`, for an address, `on_reset`, `on_waiting` and
@@ -86,12 +80,9 @@ class RigMixin(FingerEnv):
         robot: str,
         task: Mapping[str, Any],
         *,
-        pace: Pace | None = None,
         twin: str = "",
         finger_seed: int | None = None,
-        tendon_stiffness: float = 20e3,
         twin_folder: str = "",
-        timeout_s: float | None = None,
         actions: str = "impedance",
         **more: Any,
     ) -> None:
@@ -115,12 +106,12 @@ class RigMixin(FingerEnv):
                 robot,
                 state=True,
                 image=False,
-                timeout_s=timeout_s or (_TIMEOUT_S if self._own is None else _OWN_TIMEOUT_S),
+                timeout_s=_TIMEOUT_S if self._own is None else _OWN_TIMEOUT_S,
                 **more,
             )
             try:
-                rig = connect(pace=pace or "lockstep")
-                if pace is None and rig.welcome.clock == "real":
+                rig = connect(pace="lockstep")
+                if rig.welcome.clock == "real":
                     rig.close()
                     rig = connect(pace="realtime")
             except UnknownName as error:
@@ -130,9 +121,7 @@ class RigMixin(FingerEnv):
                 raise
             self._rig = opened.enter_context(closing(rig))
             name = rig.welcome.robot
-            self._rig_senses = RigSenses(
-                name, rig.action_layout, rig.observation_layout, tendon_stiffness
-            )
+            self._rig_senses = RigSenses(name, rig.action_layout, rig.observation_layout)
             if self._rig_senses.controls_length and actions != "length":
                 raise FingerError(
                     f'{name} controls lengths, so actions must be "length", not {actions!r}; '

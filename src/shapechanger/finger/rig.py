@@ -17,6 +17,7 @@ from shapechanger.layout import Layout
 
 # Length errors above this, m, come from a lost turn (30 mm on a small spool), not from arms.
 _MISFIT_M: Final = 0.012
+_COMPLIANCE: Final = 1.0 / 20e3  # m/N, of the cables, as of a twin's; chosen.
 _ABOVE_REST: Final = 1e-3
 _QUANTITIES: Final = ("length", "speed", "tension")
 
@@ -38,9 +39,7 @@ class RigSenses:
         RobotRefused: If it has other tendons, or does not measure them.
     """
 
-    def __init__(
-        self, robot: str, action_layout: Layout, state_layout: Layout, tendon_stiffness: float
-    ) -> None:
+    def __init__(self, robot: str, action_layout: Layout, state_layout: Layout) -> None:
         actions = {feature.name: feature for feature in action_layout}
         measured = {q: [f"{name}/{q}" for name in TENDONS] for q in _QUANTITIES}
         lacks = [name for name in TENDONS if name not in actions]
@@ -67,7 +66,6 @@ class RigSenses:
         self.least = self.most - self._span
         if self.controls_length:
             self.least = np.full(len(TENDONS), LEAST_TENSION_N)
-        self._compliance = 1.0 / tendon_stiffness
         # Least squares; positive arms shorten the tendons.
         self._angles_of = np.linalg.pinv(-MOMENT_ARMS)
         self._state = np.zeros(state_layout.size)
@@ -86,7 +84,7 @@ class RigSenses:
 
         Lengths fit none with slack tendons, and after a servo has lost power and its turns.
         """
-        longer = senses.lengths + self._compliance * senses.tensions + MOMENT_ARMS @ senses.angles
+        longer = senses.lengths + _COMPLIANCE * senses.tensions + MOMENT_ARMS @ senses.angles
         worst = int(np.argmax(np.abs(longer)))
         if abs(longer[worst]) <= _MISFIT_M:
             return ""
@@ -123,7 +121,7 @@ class RigSenses:
             velocities = self._differences.of(angles)
         else:
             low, high = JOINT_RANGE.T
-            angles = np.clip(self._angles_of @ (lengths + self._compliance * tensions), low, high)
+            angles = np.clip(self._angles_of @ (lengths + _COMPLIANCE * tensions), low, high)
             velocities = self._angles_of @ speeds
         return FingerSenses(angles, velocities, tensions, lengths, commands, fingertip(angles))
 

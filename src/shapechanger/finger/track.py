@@ -27,7 +27,6 @@ _CHECK_HZ: Final = 50.0
 _LOOK_S: Final = 60.0
 # Largest error of a reachable point, m: a sixth of the tolerance of the task.
 _OFF_M: Final = 0.0005
-_LOOKS: Final = 20
 
 
 def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
@@ -44,13 +43,11 @@ def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
     points = path.at(times)
     angles = _angles_along(points)
     if len(angles) < len(points):
-        # The farthest point says more than the first one out of reach.
-        later = range(len(angles), len(points), max(1, len(points) // _LOOKS))
-        worst, k = max((angles_for(points[k])[1], k) for k in later)
+        k = len(angles)
         place = "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * points[k]))
         raise PathError(
-            f"The path leaves the finger's reach: at {times[k]:.2f} s it is at {place} mm, "
-            f"{worst * 1e3:.1f} mm beyond. The knuckle is at (0, 0, 0); x points to the tip, y to "
+            f"The path leaves the finger's reach: at {times[k]:.2f} s it is at {place} mm, beyond "
+            "what the fingertip can reach. The knuckle is at (0, 0, 0); x points to the tip, y to "
             "the thumb, z to the back."
         )
     t, missing = _weakness(times, angles)

@@ -44,8 +44,8 @@ def with_row(name: str, row: int, value: float) -> dict[str, Any]:
     [
         (with_row("angles", 7, math.nan), "angles is not finite in row 7"),
         (with_row("tensions", 0, math.inf), "tensions is not finite in row 0"),
-        (with_row("t", 20, 0.1), r"backwards in row 20 .* 0\.100 s comes after 0\.380 s"),
-        ({"t": 0.02 * np.r_[:100, 150:350]}, r"every 20 ms, .* none between 1\.980 s and 3\.000 s"),
+        (with_row("t", 20, 0.1), r"backwards .* in row 20 .* 0\.100 s comes after 0\.380 s"),
+        ({"t": 0.02 * np.r_[:100, 150:350]}, r"gap .* every 20 ms, and 3\.000 s .* 1\.980 s"),
         ({"lengths": np.zeros((300, 6))}, r"lengths must have the shape \(300, 7\), got \(300, 6"),
         ({"control_dt": 0.0}, r"control_dt must be above 0 s and finite, got 0\.0"),
         ({"actions": "tensions"}, "Did you mean 'tension'"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import zipfile
@@ -15,13 +16,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import FingerError, LayoutError, OutputError, UnknownName
+from shapechanger.contract.env_ref import layouts_of
+from shapechanger.errors import FingerError, OutputError, UnknownName
+from shapechanger.files import read_file
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.controller import FingerBabble, places_of
 from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.plant import CONTROL_DT
 from shapechanger.finger.tensions import DRIVES
-from shapechanger.layout import Layout
 
 SIGNALS: Final = {
     "t": (),
@@ -91,18 +93,12 @@ class FingerLog:
             if rows.any():
                 raise FingerError(f"{name} is not finite in row {int(rows.argmax())} of the log.")
         steps = np.diff(self.t)
-        if (steps <= 0.0).any():
-            row = int((steps <= 0.0).argmax()) + 1
+        if (wrong := ~((steps > 0.0) & (steps <= _LONGEST_STEP * self.control_dt))).any():
+            row = int(wrong.argmax())
             raise FingerError(
-                f"Time runs backwards in row {row} of the log: {self.t[row]:.3f} s comes after "
-                f"{self.t[row - 1]:.3f} s."
-            )
-        gaps = steps > _LONGEST_STEP * self.control_dt
-        if gaps.any():
-            row = int(gaps.argmax())
-            raise FingerError(
-                f"The log has a gap: rows are due every {1e3 * self.control_dt:g} ms, but there is "
-                f"none between {self.t[row]:.3f} s and {self.t[row + 1]:.3f} s."
+                f"Time runs backwards or has a gap in row {row + 1} of the log: rows are due every "
+                f"{1e3 * self.control_dt:g} ms, and {self.t[row + 1]:.3f} s comes after "
+                f"{self.t[row]:.3f} s."
             )
 
     def __len__(self) -> int:
@@ -190,24 +186,18 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
         UnknownName: If its mode of action is unknown.
     """
     place = Path(path)
-    # Opening a pipe waits for a writer, and a device may never end.
-    if place.exists() and not (place.is_file() or place.is_dir()):
-        raise FingerError(f"{place.name} cannot be read: it is not a regular file.")
     try:
-        # NumPy leaves a damaged file open.
-        with place.open("rb") as raw, zipfile.ZipFile(raw) as archive:
+        raw = io.BytesIO(read_file(place, _MAX_BYTES))
+        with zipfile.ZipFile(raw) as archive:
             claimed = sum(info.file_size for info in archive.infolist())
-            if claimed > _MAX_BYTES:  # A few bytes of an archive can unpack to any size.
-                raise ValueError(f"it unpacks to {claimed} bytes, more than {_MAX_BYTES}")
-            raw.seek(0)
-            loaded: Any = np.load(raw, allow_pickle=False)
-            header = msgspec.json.decode(loaded["header"].tobytes(), type=_Header)
-            arrays = {key: np.asarray(loaded[key], np.float64) for key in SIGNALS}
+        if claimed > _MAX_BYTES:  # A few bytes of an archive can unpack to any size.
+            raise ValueError(f"it unpacks to {claimed} bytes, more than {_MAX_BYTES}")
+        loaded: Any = np.load(raw, allow_pickle=False)
+        header = msgspec.json.decode(loaded["header"].tobytes(), type=_Header)
+        arrays = {key: np.asarray(loaded[key], np.float64) for key in SIGNALS}
         if (header.joints, header.tendons) != (JOINTS, TENDONS):
             given = ", ".join((*header.joints, *header.tendons)) or "none"
-            raise ValueError(
-                f"its joints and tendons are {given}, not {', '.join(JOINTS)} and so on"
-            )
+            raise ValueError(f"its joints and tendons are {given}, and not a finger's")
     except OSError as error:
         raise FingerError(f"{path} cannot be read: {error.strerror or error}.") from error
     except (
@@ -233,18 +223,14 @@ def record_babble(
         actions: Meaning of an action of the env.
 
     Raises:
-        LayoutError: If the env has no `observation_layout`.
+        LayoutError: If the env publishes no layouts.
         UnknownName: If its layout is not a finger's.
         FingerError: If its observations are not a vector, or it ends too early.
     """
     if not isinstance(env.observation_space, gym.spaces.Box):
         raise FingerError("Recording a finger needs Box observations: omit `goal`.")
     name = env.spec.id if env.spec else type(env.unwrapped).__name__
-    layout = getattr(env.unwrapped, "observation_layout", None)
-    if not isinstance(layout, Layout):
-        raise LayoutError(
-            f"{name} publishes no observation_layout, so its observations have no names."
-        )
+    layout, _ = layouts_of(env)
     control_dt = 1.0 / float(env.metadata.get("render_fps") or 1.0 / CONTROL_DT)
     babble = FingerBabble(layout, actions, seed, control_dt)
     angles = places_of(layout, JOINTS, "angle")
