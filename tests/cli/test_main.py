@@ -209,5 +209,5 @@ def test_without_a_terminal_it_prints_lines() -> None:
     file = io.StringIO()
     with StudyProgress({"[/x]": 100, "b": 300}, Console(file=file, markup=False)) as progress:
         progress("[/x]", 100, True)
-    assert file.getvalue().startswith("[/x] ended; 1 of 2 runs, 25 % of the steps")
+    assert file.getvalue().startswith("[/x] ended; 1/2 runs, 25 % of the steps")
     assert "\x1b" not in file.getvalue()

@@ -70,10 +70,9 @@ def test_a_study_is_one_command(
 def test_progress_is_plain_lines_without_a_terminal(
     quick: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
-    """One line per completed run, with the time left, and no control characters."""
+    """One line per completed run, and no control characters."""
     lines = quick[1].stderr.splitlines()
     assert sum(" ended; " in line for line in lines) == 11
-    assert any("s left" in line for line in lines)
     assert "\x1b" not in quick[1].stderr
 
 
@@ -174,7 +173,7 @@ def test_a_robot_and_a_task_of_ones_own_are_studied(tmp_path: Path) -> None:
         cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
-    study = json.loads((tmp_path / "results" / "dog-to-dog" / "study.json").read_text())
+    study = json.loads((tmp_path / "results" / "dog-Rise-to-dog-Rise" / "study.json").read_text())
     source = study["plan"]["task"]["source"]
     assert source["kwargs"] == {"path": "dog.xml", "task": "tricks:Rise"}
     assert "reward_height" in json.dumps(study)

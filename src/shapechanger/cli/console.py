@@ -12,7 +12,6 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
-    TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
@@ -45,7 +44,6 @@ def command_line() -> str:
 
 
 _LINE_EVERY_S: Final = 10.0
-_ENOUGH_TO_TELL: Final = 0.05
 
 
 class StudyProgress:
@@ -56,15 +54,10 @@ class StudyProgress:
         self._done = dict.fromkeys(steps, 0)
         self._ended: set[str] = set()
         self._console = console or plain_console(stderr=True)
-        self._began = self._last_line = time.monotonic()
+        self._last_line = time.monotonic()
         self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.percentage:>3.0f} %"),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left:"),
-            TimeRemainingColumn(),
+            *("{task.description}", BarColumn(), "{task.percentage:>3.0f} %", MofNCompleteColumn()),
+            *(TimeElapsedColumn(), "left:", TimeRemainingColumn()),
             console=self._console,
             disable=not self._console.is_terminal,
         )
@@ -92,14 +85,10 @@ class StudyProgress:
         if self._console.is_terminal or not (ended or now - self._last_line >= _LINE_EVERY_S):
             return
         self._last_line = now
-        line = (
-            f"{run} {'ended' if ended else 'at work'}; {len(self._ended)} of {len(self._steps)} "
-            f"runs, {100 * done // total} % of the steps"
+        state = "ended" if ended else "at work"
+        self._console.print(
+            f"{run} {state}; {runs}, {100 * done // total} % of the steps", soft_wrap=True
         )
-        # The first steps include loading, so they do not predict the rest.
-        if done >= _ENOUGH_TO_TELL * total:
-            line += f", about {(now - self._began) * (total - done) / done:.0f} s left"
-        self._console.print(line, soft_wrap=True)
 
 
 class Interrupted(KeyboardInterrupt):

@@ -133,14 +133,6 @@ def _drawing() -> Results:
     yield "bad", last.partition("RenderError: ")[2] or last
 
 
-def _films() -> Results:
-    ffmpeg: Any = importlib.import_module("imageio_ffmpeg")
-    try:
-        yield "good", f"Encoded by {ffmpeg.get_ffmpeg_exe()}."
-    except RuntimeError:
-        yield "bad", "No ffmpeg: run `pip install --force-reinstall imageio-ffmpeg`."
-
-
 def _torch() -> Results:
     import torch
 
@@ -158,15 +150,6 @@ def _warp() -> Results:
         yield "unknown", "Steps on the CPU, slowly: CUDA finds no GPU here."
 
 
-def _ray() -> Results:
-    try:
-        ray: Any = importlib.import_module("ray")
-    except ImportError as error:
-        yield "bad", f"It cannot be imported ({error}): install it again."
-    else:
-        yield "good", f"{ray.__version__}; `--executor ray` runs studies on it."
-
-
 def _gpio(dev: Path) -> Results:
     """Check whether this machine has GPIO pins that a robot could use."""
     chips = sorted(dev.glob("gpiochip*"))
@@ -181,9 +164,7 @@ def _gpio(dev: Path) -> Results:
 
 _PACKAGES: Final = (
     ("images", "mujoco", _drawing),
-    ("films", "imageio-ffmpeg", _films),
     ("torch", "torch", _torch),
     ("warp", "warp-lang", _warp),
-    ("ray", "ray", _ray),
 )
 """Checks of packages that are installed: name, package, function."""

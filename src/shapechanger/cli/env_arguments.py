@@ -19,7 +19,11 @@ from shapechanger.envs.naming import allow_own_modules, driven, env_ref
 from shapechanger.errors import MorphologyError, StudyError, no_policy_file
 from shapechanger.transfer.references import reference_policy
 
-EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+EnvId = Annotated[
+    str,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="ENV", help="Id of the env, such as BigAnt or shapechanger/BigAnt-v1."),
+]
 Body = Annotated[str, tyro.conf.arg(help="Another body of the family: its name, or edits as JSON.")]
 OwnLearner = Annotated[
     str,
@@ -83,7 +87,6 @@ class OneEnv:
     """Options of a command for one env."""
 
     env: EnvId
-    """Id of the env, such as BigAnt or shapechanger/BigAnt-v1."""
     body: Body = ""
     options: str = ""
     """More arguments of the env as JSON, such as '{"frame_skip": 4}'."""

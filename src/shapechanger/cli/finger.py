@@ -6,20 +6,19 @@ import dataclasses
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import print_table, say
-from shapechanger.cli.env_arguments import EnvId, options_of
-from shapechanger.contract.env_ref import EnvRef
+from shapechanger.cli.env_arguments import EnvId, opened, options_of
 from shapechanger.envs.naming import env_ref
-from shapechanger.errors import FingerError, OutputError, StudyError, UnknownName, check_seed
+from shapechanger.errors import FingerError, OutputError, StudyError, check_seed
 from shapechanger.files import read_file, require_file, write_atomic
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.gap import resolve_gap, shipped_rig
-from shapechanger.finger.identify import IdentifiedFinger, identify, load_log, save_log
+from shapechanger.finger.identify import identify, load_log, save_log
 from shapechanger.finger.identify.log import record_babble
 from shapechanger.finger.model import finger_mjcf
 from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters, named_set
@@ -67,9 +66,19 @@ class FingerIdentify:
         write_atomic(page, finger_html(found, self.log.name).encode())
         if self.out is not None:
             write_atomic(self.out, found.parameters.to_json().encode())
-        print_table(_arms_table(found))
+        cells = {e.name: arm_cell(e) for e in found.arms}
+        arms = Table("moment arm [mm]", *JOINTS, box=None, pad_edge=False)
+        for tendon in TENDONS:
+            names = (f"moment_arms/{tendon}/{joint}" for joint in JOINTS)
+            arms.add_row(tendon, *(cells.get(name, "") for name in names))
+        print_table(arms)
         say("* the nominal arm is outside the 95 % interval\n")
-        print_table(_table(found))
+        columns = ("parameter", "identified", "95 % interval", "nominal")
+        others = Table(*columns, box=None, pad_edge=False)
+        for e in found.estimates:
+            if e not in found.arms:
+                others.add_row(label(e), number(e, e.value), interval(e), number(e, e.nominal))
+        print_table(others)
         for name, why in unknown(found):
             say(f"{name} is unknown: {why}")
         for name, why in found.undetermined:
@@ -78,29 +87,11 @@ class FingerIdentify:
         say(summary_line(found))
 
 
-def _arms_table(found: IdentifiedFinger) -> Table:
-    cells = {e.name: arm_cell(e) for e in found.arms}
-    table = Table("moment arm [mm]", *JOINTS, box=None, pad_edge=False)
-    for tendon in TENDONS:
-        names = (f"moment_arms/{tendon}/{joint}" for joint in JOINTS)
-        table.add_row(tendon, *(cells.get(name, "") for name in names))
-    return table
-
-
-def _table(found: IdentifiedFinger) -> Table:
-    table = Table("parameter", "identified", "95 % interval", "nominal", box=None, pad_edge=False)
-    for e in found.estimates:
-        if e not in found.arms:
-            table.add_row(label(e), number(e, e.value), interval(e), number(e, e.nominal))
-    return table
-
-
 @dataclass(frozen=True)
 class FingerRecord:
     """Excite all joints of a finger and log the motion."""
 
     env: EnvId
-    """Id of the env, such as Finger."""
     out: Path
     """The log to write, such as finger.npz."""
     seconds: float = 10.0
@@ -123,20 +114,10 @@ class FingerRecord:
         if not 0.0 < self.seconds < float("inf"):
             raise FingerError(f"--seconds is more than 0, got {self.seconds}.")
         require_file(self.out)
-        ref = env_ref(self.env)
-        more: dict[str, Any] = {"actions": self.actions}
-        if self.gap:
-            more |= {"gap": self.gap, "finger_seed": self.finger_seed}
-        ref = EnvRef(ref.id, {**ref.kwargs, **more, **options_of(self.options, "--options")})
-        try:
-            env = ref.make(max_episode_steps=-1)
-        except (TypeError, UnknownName) as error:
-            reason = str(error).partition(" was raised from")[0].rstrip(".")
-            raise FingerError(f"{ref.id} is not a finger env: {reason}.") from error
-        try:
+        of_gap = {"gap": self.gap, "finger_seed": self.finger_seed} if self.gap else {}
+        more = {"actions": self.actions, **of_gap, **options_of(self.options, "--options")}
+        with opened(env_ref(self.env).having(more), max_episode_steps=-1) as env:
             log = record_babble(env, self.seconds, self.seed, self.actions)
-        finally:
-            env.close()
         save_log(log, self.out)
         say(
             f"wrote {len(log)} rows, {log.seconds:g} s, to {self.out}\n"
@@ -167,11 +148,9 @@ class FingerExport:
         require_file(self.out)
         if self.gap and self.parameters:
             raise FingerError("Give either --parameters or --gap, not both.")
-        finger = NOMINAL
+        finger = _parameters(self.parameters) if self.parameters else NOMINAL
         if self.gap:
             finger = resolve_gap(self.gap).draw(np.random.default_rng(self.finger_seed))
-        elif self.parameters:
-            finger = _parameters(self.parameters)
         text = finger_mjcf(finger, drive_of(self.actions, NOMINAL))
         write_atomic(self.out, text.encode())
         say(f"wrote {self.out}")

@@ -77,7 +77,6 @@ class Play(Watching):
     """Watch a policy in an env, in a window or as a video."""
 
     env: EnvId
-    """Id of the env, such as BigAnt."""
     policy: Path | None = None
     """A policy that `train`, a study or `policies export` has written, or `reference` for the one
     that ships for the env; random actions if not given. A policy for another body acts through the

@@ -116,9 +116,8 @@ class PoliciesList:
 
     def run(self) -> None:
         if self.references:
-            self._print_references()
+            _print_references()
             return
-
         table = Table("file", "env", "learner", "steps", "seed", box=None)
         for path in sorted(self.folder.rglob("*.safetensors")):
             name = str(path.relative_to(self.folder))
@@ -135,15 +134,16 @@ class PoliciesList:
             )
         print_table(table, _FILE_WIDTH)
 
-    def _print_references(self) -> None:
-        table = Table("env", "learner", "steps", "measure", "no skill", "each seed", box=None)
-        for env, reference in load_references().items():
-            measure = next(iter(reference.ends))
-            floor = max(values[measure] for values in reference.floor.values())
-            ends = ", ".join(f"{value:.4g}" for value in reference.ends[measure])
-            steps = f"{reference.steps:,}"
-            table.add_row(env, reference.learner, steps, measure, f"{floor:.4g}", ends)
-        print_table(table, _FILE_WIDTH)
+
+def _print_references() -> None:
+    table = Table("env", "learner", "steps", "measure", "no skill", "each seed", box=None)
+    for env, reference in load_references().items():
+        measure = next(iter(reference.ends))
+        floor = max(values[measure] for values in reference.floor.values())
+        ends = ", ".join(f"{value:.4g}" for value in reference.ends[measure])
+        steps = f"{reference.steps:,}"
+        table.add_row(env, reference.learner, steps, measure, f"{floor:.4g}", ends)
+    print_table(table, _FILE_WIDTH)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,11 +233,9 @@ class PoliciesConvert:
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A zip that the model's `save` wrote."""
     env: EnvId
-    """Id of the env that it was trained in; its layouts must fit the policy's spaces."""
     out: Path
     """The file to write, such as mine.safetensors."""
-    body: str = ""
-    """Body that it was trained in: its name, or edits as JSON."""
+    body: Body = ""
     trust: bool = False
     """Required, because the zip holds pickled objects: give it only if you trust its author."""
 
@@ -289,11 +287,7 @@ class PoliciesPull:
             raise HubError(f"{self.out} exists already: choose another name, or move it away.")
         with tempfile.TemporaryDirectory() as folder:
             commit = hub.pull(
-                self.repo,
-                "policy",
-                Path(folder),
-                revision=self.revision,
-                max_bytes=MAX_BYTES,
+                self.repo, "policy", Path(folder), revision=self.revision, max_bytes=MAX_BYTES
             )
             path = Path(folder) / hub.POLICY
             try:

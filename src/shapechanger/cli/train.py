@@ -34,7 +34,6 @@ class Train:
     """Train a policy in one env and write it to a file for `play` and `transfer`."""
 
     env: EnvId
-    """Id of the env, such as BigAnt."""
     body: Body = ""
     bodies: int = 0
     """Train one policy in this many bodies at once, drawn from the env's family; 0 for one body."""

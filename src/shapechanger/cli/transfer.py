@@ -12,9 +12,7 @@ from rich.table import Table
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, print_table, say
 from shapechanger.cli.env_arguments import Learner, Settings, TwoEnvs, policy_file, settings_of
-from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.catalogue import OWN_ROBOT
-from shapechanger.envs.naming import allow_own_modules, default_learner
+from shapechanger.envs.naming import allow_own_modules, default_learner, short_name
 from shapechanger.errors import MapError, OutputError, StudyError, check_seed
 from shapechanger.files import read_text
 from shapechanger.registry import METHODS
@@ -169,7 +167,7 @@ class Transfer(TwoEnvs, StudyRuns):
             traits=traits,
         )
         executor = self.made_executor()
-        out = self.out or Path("results", f"{_name(task.source)}-to-{_name(task.target)}")
+        out = self.out or Path("results", f"{short_name(self.source)}-to-{short_name(self.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):
             say(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
@@ -206,18 +204,10 @@ def _split_rule(text: str) -> tuple[str, str]:
     return name, rule
 
 
-def _name(env: EnvRef) -> str:
-    if env.id == OWN_ROBOT:
-        return Path(env.kwargs["path"]).stem
-    return env.id.split("/")[-1].removesuffix("-v1")
-
-
 def _way_on(plan: Plan, out: Path) -> str:
     """Return how to resume an interrupted study; empty if it had not started."""
     if not is_folder_of(plan, out):
         return ""
-    if len(unfinished_runs(plan, out)) == len(plan.runs()):
-        return f"No run had ended; begin again with: {command_line()}"
     return f"Runs that had ended are kept in {out}; go on with: {command_line()}"
 
 

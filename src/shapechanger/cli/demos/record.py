@@ -19,7 +19,7 @@ from shapechanger.demos.episodes import episode_at
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.demos.replay import play_in_env, write_episode_film
 from shapechanger.envs.catalogue import VEHICLE_ENVS
-from shapechanger.envs.naming import driven, env_ref
+from shapechanger.envs.naming import env_ref
 from shapechanger.errors import DemosError, StudyError, check_seed
 from shapechanger.robot.client.recordings import play_on_robot
 from shapechanger.transfer.executor import use_one_thread
@@ -53,11 +53,7 @@ class DemosRecord(OneEnv):
             if not 0.0 < value < float("inf"):
                 raise DemosError(f"--{name} is more than 0, got {value}.")
         ref = self._ref()
-        try:
-            made = ref.make(max_episode_steps=-1)
-        except TypeError as error:
-            reason = str(error).partition(" was raised from")[0]
-            raise DemosError(f"{ref.id} cannot be made with these --options: {reason}.") from error
+        made = ref.make(max_episode_steps=-1)
         try:
             hz = float(made.metadata.get("render_fps") or 20.0)
             longest = max(1, round(self.episode_s * hz))
@@ -92,20 +88,15 @@ class DemosRecord(OneEnv):
 
     def _ref(self) -> EnvRef:
         ref = env_ref(self.env, self.body)
-        more: dict[str, Any] = {}
-        if ref.id in VEHICLE_ENVS:
-            more["state"] = True
-            if self.lenses:
-                driven(ref, self.lenses)
-                more["lenses"] = list(self.lenses)
-            if self.put_back:
-                more["put_back"] = True
-        elif self.lenses or self.put_back:
+        more: dict[str, Any] = {"state": True} if ref.id in VEHICLE_ENVS else {}
+        more |= {"lenses": list(self.lenses)} if self.lenses else {}
+        more |= {"put_back": True} if self.put_back else {}
+        if more and ref.id not in VEHICLE_ENVS:
             raise DemosError(
                 f"--put-back and --lenses are for vehicles, and {ref.id} is not one of them: "
                 f"{', '.join(VEHICLE_ENVS)}."
             )
-        return EnvRef(ref.id, {**ref.kwargs, **more, **options_of(self.options, "--options")})
+        return ref.having({**more, **options_of(self.options, "--options")})
 
     def _about(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
         world = getattr(env.unwrapped, "world", None)
