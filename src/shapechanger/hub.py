@@ -19,11 +19,13 @@ from importlib import import_module
 from importlib.metadata import version
 from multiprocessing.pool import ThreadPool
 from pathlib import Path
+from textwrap import indent
 from typing import Any, Final, Literal
 
 import msgspec
 
 from shapechanger.errors import HubError, MissingExtra, OutputError, ShapechangerError
+from shapechanger.layout import Layout
 
 Kind = Literal["policy", "demonstrations"]
 
@@ -57,6 +59,40 @@ class _Listed(msgspec.Struct):
     files: dict[str, _File] = {}
     format: int = 0
     version: str = ""
+
+
+def features_text(layout: Layout | None, more: str = "") -> str:
+    """Return the features of a layout with their units, in Markdown; `more` without a layout."""
+    if layout is None:
+        return more
+    return f"{layout.size} numbers: " + ", ".join(f"`{feature}`" for feature in layout)
+
+
+def readme(
+    repo: str,
+    tags: list[str],
+    lead: str,
+    rows: dict[str, object],
+    layouts: dict[str, str],
+    command: str,
+    usage: str,
+) -> str:
+    """Return a README for the Hub, with a YAML header."""
+    cells = {name: " ".join(str(value).replace("|", "\\|").split()) for name, value in rows.items()}
+    table = "\n".join(f"| {name} | {cell} |" for name, cell in cells.items())
+    parts = [
+        "---\nlibrary_name: shapechanger\ntags:\n"
+        + "".join(f"- {tag}\n" for tag in ("shapechanger", "robotics", *tags))
+        + "---",
+        f"# {repo}",
+        lead,
+        f"| | |\n| --- | --- |\n{table}",
+        *(f"**{name}**: {features}" for name, features in layouts.items()),
+    ]
+    for title, code in (("Made by", command), ("Use it", usage)):
+        if code:
+            parts += [title, indent(code, "    ")]
+    return "\n\n".join(parts) + "\n"
 
 
 def sha256_of(path: Path) -> str:

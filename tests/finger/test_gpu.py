@@ -305,7 +305,7 @@ def test_a_finger_given_at_a_reset_moves_as_one_made_with_it() -> None:
         require_equal(worlds.step(actions), alone, actions)
     other: Any = {"tendon_stiffness": 8e3}
     for body, error, sentence in (
-        (other, VectorEnvError, r"the finger with tendon_stiffness=.* cannot join"),
+        (other, VectorEnvError, r"a finger cannot join"),
         ("an-1984", UnknownName, "Did you mean 'an-1983'"),
         ({"moment_arms": np.eye(7, 4)}, FingerError, "cannot balance the joints"),
     ):

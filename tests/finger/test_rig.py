@@ -18,7 +18,6 @@ from shapechanger.finger.anatomy import (
     TENDONS,
 )
 from shapechanger.finger.gap import GAPS, shipped_rig, with_gears
-from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.plant import JointVelocities
 from shapechanger.finger.rig import RigSenses
 from shapechanger.finger.task import fingertip
@@ -140,18 +139,6 @@ def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
         said = senses.misfit(senses.read(state, (), np.zeros(7)))
         assert f"{TENDONS[lost]} is off by" in said
         assert "robot home" in said
-
-
-def test_a_geared_finger_is_within_its_gap() -> None:
-    """Arms stay nominal, and the motors are within the ranges of the gap."""
-    geared = with_gears(NOMINAL)
-    gap = GAPS["real-like"]
-    assert geared.moment_arms == NOMINAL.moment_arms
-    for name in ("motor_kg", "tendon_damping", "tendon_friction", "motor_lag"):
-        low, high = getattr(gap, name)
-        assert low < getattr(geared, name) < high
-    drawn = gap.draw(np.random.default_rng(0))
-    assert 0.5 < drawn.motor_kg / geared.motor_kg < 2.0
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,8 @@ from rich.progress import (
 )
 from rich.table import Table
 
+_WIDEST: Final = 400
+
 
 def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
     """Return a console without markup or emoji, so that `a[b]` and `:a:` print verbatim."""
@@ -28,9 +30,13 @@ def say(text: str, *, stderr: bool = False) -> None:
     plain_console(stderr=stderr).print(text, soft_wrap=True)
 
 
-def print_table(table: Table, file_width: int | None = None) -> None:
-    """Print a table, as wide as the terminal."""
-    plain_console(width=None if sys.stdout.isatty() else file_width).print(table)
+def print_table(table: Table) -> None:
+    """Print a table, as wide as the terminal, or as its content where there is none."""
+    console = plain_console()
+    if not console.is_terminal:
+        widest = console.options.update(width=_WIDEST)
+        console = plain_console(width=console.measure(table, options=widest).maximum)
+    console.print(table)
 
 
 def counted(number: int, noun: str) -> str:

@@ -1,4 +1,4 @@
-"""Options that commands share: envs, bodies, policies and learners."""
+"""Options that commands share: envs, bodies, policies, learners and the Hub."""
 
 from __future__ import annotations
 
@@ -44,6 +44,13 @@ Settings = Annotated[
     tyro.conf.arg(
         help="Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."
     ),
+]
+RepoName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="REPO")]
+Public = Annotated[
+    bool, tyro.conf.arg(help="Make a new repository public; it is private if not given.")
+]
+Revision = Annotated[
+    str, tyro.conf.arg(help="Commit, branch or tag; the newest commit if not given.")
 ]
 _REFERENCE: Final = "reference"
 

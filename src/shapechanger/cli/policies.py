@@ -6,7 +6,7 @@ import math
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 import msgspec
 import tyro
@@ -14,8 +14,15 @@ from rich.table import Table
 
 from shapechanger import hub
 from shapechanger.cli.console import command_line, print_table, say
-from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened
-from shapechanger.cli.hub import Public, RepoName, Revision, features_text, readme
+from shapechanger.cli.env_arguments import (
+    Body,
+    EnvId,
+    OwnLearner,
+    Public,
+    RepoName,
+    Revision,
+    opened,
+)
 from shapechanger.cli.play import Watching, acting_in, load_any_policy
 from shapechanger.contract.env_ref import EnvRef, hold_out, layouts_of, measures_of
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
@@ -28,8 +35,6 @@ from shapechanger.transfer.identities import ENV, known, single_body
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.references import load_references
 from shapechanger.vehicles.expert import PERIOD_S
-
-_FILE_WIDTH: Final = 160
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +137,7 @@ class PoliciesList:
                 f"There is no policy in {self.folder}: train one, name a folder, or give "
                 "--references for those that ship."
             )
-        print_table(table, _FILE_WIDTH)
+        print_table(table)
 
 
 def _print_references() -> None:
@@ -143,7 +148,7 @@ def _print_references() -> None:
         ends = ", ".join(f"{value:.4g}" for value in reference.ends[measure])
         steps = f"{reference.steps:,}"
         table.add_row(env, reference.learner, steps, measure, f"{floor:.4g}", ends)
-    print_table(table, _FILE_WIDTH)
+    print_table(table)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,14 +311,14 @@ def _policy_card(file: Path, repo: str) -> str:
     rows: dict[str, object] = {**origin_of(card), "SHA-256": hub.sha256_of(file)}
     seen = "" if card.clone is None else f"image ({card.clone.eyes})"
     done = ", ".join(STEERING)
-    return readme(
+    return hub.readme(
         repo,
         ["reinforcement-learning"],
         f"A policy of Shapechanger for `{rows['env']}`.",
         rows,
         {
-            "Observation": features_text(card.observation, seen),
-            "Action": features_text(card.action, done),
+            "Observation": hub.features_text(card.observation, seen),
+            "Action": hub.features_text(card.action, done),
         },
         card.command,
         f"shapechanger policies pull {repo} --out policy.safetensors\n"

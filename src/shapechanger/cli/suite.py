@@ -56,7 +56,6 @@ from shapechanger.transfer.suite import StudyOutcome, merge_study, open_study_fo
 
 _SUMMARY: Final = "suite.json"
 _FILM: Final = "film.mp4"
-_FILE_WIDTH: Final = 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +143,7 @@ class SuiteWatch:
             raise StudyError(f"--every is a number of seconds above 0, got {self.every:g}.")
         table, complete = _progress_table(self.folder)
         if not sys.stdout.isatty():
-            print_table(table, _FILE_WIDTH)
+            print_table(table)
             return
         with Live(table, console=plain_console(), auto_refresh=False) as live:
             while not complete:
@@ -309,7 +308,7 @@ def _print_outcomes(found: list[StudyOutcome]) -> None:
                 for gain in outcome.gains.values()
             ),
         )
-    print_table(table, _FILE_WIDTH)
+    print_table(table)
     halves = sum(outcome.halves for outcome in found)
     arms = " or ".join(dict.fromkeys(outcome.arm for outcome in found))
     say(

@@ -41,7 +41,6 @@ from shapechanger.transfer.study import (
 # Divisor of the budget and number of seeds of --quick: enough to see that everything works.
 _QUICK_DIVISOR: Final = 8
 _QUICK_SEEDS: Final = 2
-_FILE_WIDTH: Final = 120
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +215,7 @@ def _print(study: Study) -> None:
     # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
     for row in [row for row in measure_rows(study) if row.target != "undefined"]:
         table.add_row(row.arm, row.measure, row.target, row.total, row.unit)
-    print_table(table, _FILE_WIDTH)
+    print_table(table)
     say(f"\n{verdict(study)}")
     for sentence in filter(None, (other_arms(study), *weak_individuals(study))):
         say(sentence)

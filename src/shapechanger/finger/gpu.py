@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import textwrap
 from abc import abstractmethod
 from functools import partial
 from typing import Any, Final, cast
 
 import gymnasium as gym
-import msgspec
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -29,7 +27,7 @@ from shapechanger.envs.warp.worlds import DeviceOutcome, Worlds
 from shapechanger.errors import VectorEnvError
 from shapechanger.finger.anatomy import DIP_BAND, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.env import SMOOTHNESS, FingerLike, as_finger
-from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.plant import CONTROL_DT, FingerPlant, shares, slewed, slews, smoothed
 from shapechanger.finger.postures import START_SPREAD, coupled, inner_range
 from shapechanger.finger.reach import HELD_STEPS, TOLERANCE_M, FingerReachEnv
@@ -374,7 +372,7 @@ class FingerReader(BodyReader):
         env = self._env
         plant = FingerPlant(body, env.drive)
         model, held = plant.model, plant.held
-        found = device_body(_described(body), model, _numbers(plant))
+        found = device_body("a finger", model, _numbers(plant))
         timestep = float(model.opt.timestep)
         rows = {**found.rows, "actuator_delay": np.full(model.nu, _device_delay(body, timestep))}
         steps = round(CONTROL_DT / timestep)
@@ -432,13 +430,6 @@ def _device_delay(parameters: FingerParameters, timestep: float) -> float:
     # A delay ends at a step, so that it may as well end half a step before, where single precision
     # decides the same way.
     return (math.ceil(steps) - 0.5) * timestep if delay > 0.0 else 0.0
-
-
-def _described(parameters: FingerParameters) -> str:
-    """Describe how a finger differs from the nominal one, for messages."""
-    given, nominal = msgspec.structs.asdict(parameters), msgspec.structs.asdict(NOMINAL)
-    own = ", ".join(f"{name}={v}" for name, v in given.items() if v != nominal[name])
-    return f"the finger with {textwrap.shorten(own, 60)}" if own else "the nominal finger"
 
 
 for _env_class in FINGERS:

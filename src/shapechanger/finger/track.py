@@ -141,57 +141,18 @@ class FingerTrackEnv(FingerEnv):
     """Follow a point that moves along a known path.
 
     ## Action space
-    `Box(-1, 1, (7,), float32)`, one command per tendon, as in `Finger-v1`.
-
-    | Num | Action        | Min | Max | Unit |
-    | --- | ------------- | --- | --- | ---- |
-    | 0   | `FDP/command` | -1  | 1   | 1    |
-    | 1   | `FDS/command` | -1  | 1   | 1    |
-    | 2   | `EIP/command` | -1  | 1   | 1    |
-    | 3   | `EDC/command` | -1  | 1   | 1    |
-    | 4   | `LUM/command` | -1  | 1   | 1    |
-    | 5   | `DI/command`  | -1  | 1   | 1    |
-    | 6   | `PI/command`  | -1  | 1   | 1    |
+    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`.
 
     ## Observation space
-    `Box(-inf, inf, (47,), float64)`: the measurements of `Finger-v1`; the place of the point at the
-    end of the step, and the vectors from the fingertip to it and to its places 0.06, 0.12 and
-    0.20 s from now.
+    `Box(-inf, inf, (47,), float64)`: the table of `Finger-v1`, whose target is the place of the
+    point at the end of the step; then the vectors from the fingertip to its places 0.06, 0.12 and
+    0.20 s from now, m:
 
-    | Num   | Observation           | Min      | Max    | Unit  |
-    | ----- | --------------------- | -------- | ------ | ----- |
-    | 0     | `MCP_flexion/angle`   | -0.3491  | 1.571  | rad   |
-    | 1     | `MCP_abduction/angle` | -0.3491  | 0.3491 | rad   |
-    | 2     | `PIP_flexion/angle`   | 0        | 1.833  | rad   |
-    | 3     | `DIP_flexion/angle`   | -0.08727 | 1.396  | rad   |
-    | 4-7   | `*/velocity`          | -inf     | inf    | rad/s |
-    | 8     | `FDP/tension`         | 0        | 25     | N     |
-    | 9     | `FDS/tension`         | 0        | 25     | N     |
-    | 10    | `EIP/tension`         | 0        | 7.056  | N     |
-    | 11    | `EDC/tension`         | 0        | 25     | N     |
-    | 12    | `LUM/tension`         | 0        | 6.48   | N     |
-    | 13    | `DI/tension`          | 0        | 25     | N     |
-    | 14    | `PI/tension`          | 0        | 25     | N     |
-    | 15-21 | `*/length`            | -inf     | inf    | m     |
-    | 22-28 | `*/command`           | -1       | 1      | 1     |
-    | 29    | `fingertip/x`         | -inf     | inf    | m     |
-    | 30    | `fingertip/y`         | -inf     | inf    | m     |
-    | 31    | `fingertip/z`         | -inf     | inf    | m     |
-    | 32    | `target/x`            | -inf     | inf    | m     |
-    | 33    | `target/y`            | -inf     | inf    | m     |
-    | 34    | `target/z`            | -inf     | inf    | m     |
-    | 35    | `target/dx`           | -inf     | inf    | m     |
-    | 36    | `target/dy`           | -inf     | inf    | m     |
-    | 37    | `target/dz`           | -inf     | inf    | m     |
-    | 38    | `ahead_60ms/dx`       | -inf     | inf    | m     |
-    | 39    | `ahead_60ms/dy`       | -inf     | inf    | m     |
-    | 40    | `ahead_60ms/dz`       | -inf     | inf    | m     |
-    | 41    | `ahead_120ms/dx`      | -inf     | inf    | m     |
-    | 42    | `ahead_120ms/dy`      | -inf     | inf    | m     |
-    | 43    | `ahead_120ms/dz`      | -inf     | inf    | m     |
-    | 44    | `ahead_200ms/dx`      | -inf     | inf    | m     |
-    | 45    | `ahead_200ms/dy`      | -inf     | inf    | m     |
-    | 46    | `ahead_200ms/dz`      | -inf     | inf    | m     |
+    | Num   | Observation              | Min  | Max | Unit |
+    | ----- | ------------------------ | ---- | --- | ---- |
+    | 38-40 | `ahead_60ms/dx` to `dz`  | -inf | inf | m    |
+    | 41-43 | `ahead_120ms/dx` to `dz` | -inf | inf | m    |
+    | 44-46 | `ahead_200ms/dx` to `dz` | -inf | inf | m    |
 
     ## Reward
     As in `Finger-v1`, with the moving point as target: 50 dt (0.5 / (1 + d / 0.020 m)

@@ -99,7 +99,6 @@ def kinematics(compliance: float, compliance_sd: float, noise: float = 1e-6) -> 
         compliance=compliance,
         compliance_sd=compliance_sd,
         joint_noise=np.full(4, noise),
-        length_noise=1e-5,
         angles=np.zeros((1, 4)),
     )
 

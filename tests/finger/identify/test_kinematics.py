@@ -5,7 +5,6 @@ import pytest
 
 from shapechanger.finger.identify.kinematics import (
     ARMS,
-    _Regression,
     fit_kinematics,
     interval_quantile,
     robust_covariance,
@@ -27,7 +26,6 @@ def test_synthetic_logs_give_their_parameters() -> None:
     assert found.compliance == pytest.approx(5e-5, rel=0.05)
     assert 1e-7 < found.compliance_sd < 2.5e-6
     np.testing.assert_allclose(found.joint_noise, noise, rtol=0.1)
-    assert found.length_noise == pytest.approx(2e-5, rel=0.2)
     # The lengths give the angles too, which removes most of their noise.
     assert np.std(found.angles - swings(log.t)) < 0.5 * noise
 
@@ -62,21 +60,3 @@ def test_intervals_are_wider_for_short_logs() -> None:
     assert interval_quantile(10**9, 0.02) == pytest.approx(1.96, abs=1e-4)
     assert interval_quantile(250, 0.02) == pytest.approx(1.96 + 0.29694 + 0.00416 - 0.0005324)
     assert interval_quantile(5, 0.02) == pytest.approx(1.96 + 2.9694 + 0.4160 - 0.5324)
-
-
-def test_lengths_weigh_less_while_friction_changes_its_sign() -> None:
-    """The variance of a tendon at rest grows by half of its friction squared."""
-    directions = np.vstack([np.zeros(7), np.ones(7)])
-    friction_m, noise_m = 2e-4, 1e-4
-    rows = _Regression(
-        lengths=-friction_m * directions,
-        angles=np.zeros((2, 4)),
-        tensions=np.zeros((2, 7)),
-        speeds=np.zeros((2, 7)),
-        directions=directions,
-    )
-    x = np.zeros(int(ARMS.sum()) + 7 + 3)
-    x[-2] = friction_m / 1e-4  # In units of the fit.
-    variance = rows.variance(x, np.full(4, 1e-3), noise_m)
-    np.testing.assert_allclose(variance[0], noise_m**2 + 0.5 * friction_m**2)
-    np.testing.assert_allclose(variance[1], noise_m**2)

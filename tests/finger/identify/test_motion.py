@@ -9,7 +9,6 @@ import pytest
 
 from shapechanger.errors import MissingExtra
 from shapechanger.finger.anatomy import JOINTS
-from shapechanger.finger.identify import motion
 from shapechanger.finger.identify.kinematics import ARMS, Kinematics
 from shapechanger.finger.identify.log import FingerLog
 from shapechanger.finger.identify.motion import (
@@ -17,15 +16,12 @@ from shapechanger.finger.identify.motion import (
     MOTOR_KG,
     CommandSignal,
     Motors,
-    _MotionFit,
     cut_windows,
     fit_dynamics,
     fit_motors,
-    steps_per_period,
     with_motors,
 )
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
-from shapechanger.finger.tensions import drive_of
 from tests.finger.identify.logs import changed, made_up, recorded
 
 ARM_SD_M = 2e-4
@@ -53,7 +49,6 @@ def exact(arms: np.ndarray = NOMINAL.arms) -> Kinematics:
         compliance=0.0,
         compliance_sd=1e-9,
         joint_noise=np.full(4, 1e-6),
-        length_noise=1e-6,
         angles=log.angles,
     )
 
@@ -75,18 +70,6 @@ def test_joints_and_friction_are_found() -> None:
     assert all(1e-3 < sd < 0.2 for _, sd in found.values())
 
 
-def test_the_covariance_has_the_correction_for_few_windows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two windows with opposite errors: a sandwich, times two windows over one."""
-    fit = _MotionFit.__new__(_MotionFit)
-    monkeypatch.setattr(motion, "_PRIOR_SD", 1.0)
-    parts = [np.array([3.0]), np.array([-3.0]), np.zeros(1)]
-    monkeypatch.setattr(_MotionFit, "residual", lambda *_: (parts, None, None))
-    monkeypatch.setattr(_MotionFit, "parameters", lambda _: None)
-    found = fit.covariance(np.zeros(1), np.array([[1.0], [2.0], [1.0]]))
-    bread, filling = 1.0 / 6.0, 1.0 + 3.0**2 + 6.0**2
-    assert found[0, 0] == pytest.approx(2.0 * bread**2 * filling)
-
-
 def test_windows_begin_in_the_measured_state() -> None:
     """Windows last 1 s from 0.3 s on, and start with measured velocities and activations."""
     log, _ = short()
@@ -105,11 +88,6 @@ def test_windows_begin_in_the_measured_state() -> None:
         assert (window.activations <= acting.max(axis=0) + 1e-3).all()
     assert len(cut_windows(log, exact(), motors(), 80)) == 1
     assert len(cut_windows(log, exact(), motors(), None, 0.5, 0.0)) == 5
-
-
-@pytest.mark.parametrize(("period_s", "steps"), [(0.02, 10), (0.021, 11), (0.0005, 1)])
-def test_a_control_period_is_the_least_number_of_steps(period_s: float, steps: int) -> None:
-    assert steps_per_period(period_s, 0.002) == steps
 
 
 def test_known_motors_take_precedence() -> None:
@@ -155,53 +133,12 @@ def test_motors_follow_with_their_lag() -> None:
     np.testing.assert_allclose(held.activations(0.0, 0.001, 50, 0.02, 0.03), 0.4)
 
 
-def followed(
-    lag: float, delay: float, strength: float, noise: float, most_command: float = 1.0
-) -> FingerLog:
-    """Return a log of motors at fixed lengths, with random commands of 0.2 s, in steps of 1 ms."""
-    rng = np.random.default_rng(3)
-    rows, per_row = 300, 20
-    t = 0.02 * np.arange(rows)
-    drawn = np.clip(rng.uniform(-1.5, 1.5, (rows // 10, 7)), -1.0, 1.0)
-    commands = most_command * np.repeat(drawn, 10, axis=0)
-    drive, most = drive_of("tension", NOMINAL), np.array(NOMINAL.most_tension)
-    activation = commands[0].copy()
-    tensions = np.empty((rows, 7))
-    for step in range(per_row * (rows - 1) + 1):  # Measured after `step` steps.
-        if step % per_row == 0:
-            wanted = drive.offset + drive.gain * activation
-            tensions[step // per_row] = np.clip(wanted, NOMINAL.least_tension, strength * most)
-        # The period that ends with row i starts at step 20 (i - 1).
-        row = (step - round(delay / 0.001)) // per_row + 1
-        acting = commands[min(max(row, 0), rows - 1)]
-        activation = activation + (1.0 - np.exp(-0.001 / lag)) * (acting - activation)
-    tensions += noise * rng.standard_normal(tensions.shape)
-    return changed(made_up(), t=t, commands=commands, tensions=tensions, actions="tension")
-
-
-def scaled(strength: float) -> FingerParameters:
-    """Return the nominal finger with scaled tension limits."""
-    return NOMINAL.replace(most_tension=tuple(strength * v for v in NOMINAL.most_tension))
-
-
-def test_synthetic_logs_give_the_motors() -> None:
-    """Lag, delay, noise and the strength relative to known motors are found."""
-    log = changed(followed(0.045, 0.037, 0.8, 0.1), motors=scaled(0.7))
-    found = fit_motors(log)
-    assert found.lag == pytest.approx(0.045, abs=0.001)
-    assert found.delay == pytest.approx(0.037, abs=0.001)
-    assert found.saturates
-    assert found.strength == pytest.approx(0.8 / 0.7, abs=0.01)
-    assert found.tension_noise == pytest.approx(0.1, rel=0.1)
-    assert all(0.0 < sd < limit for sd, limit in zip(found.sd, (1e-3, 1e-3, 0.01), strict=True))
-
-
 def test_strength_needs_saturation() -> None:
-    """Without saturation the strength is that assumed; exact tensions have no noise."""
-    found = fit_motors(followed(0.03, 0.02, 1.0, 0.0, most_command=0.5))
-    assert not found.saturates
-    assert found.strength == 1.0
-    assert found.tension_noise == 0.0
+    """Without saturation the strength is that assumed."""
+    strong = tuple(3.0 * tension for tension in NOMINAL.most_tension)
+    log, _ = recorded(3.0, actions="tension", parameters=NOMINAL.replace(most_tension=strong))
+    found = fit_motors(changed(log, motors=None))
+    assert (found.saturates, found.strength) == (False, 1.0)
 
 
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])

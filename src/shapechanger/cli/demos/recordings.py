@@ -12,11 +12,11 @@ from typing import Annotated, Final
 
 import numpy as np
 import tyro
-from rich.table import Table
+from rich.table import Column, Table
 
 from shapechanger import hub
-from shapechanger.cli.console import counted, plain_console, say
-from shapechanger.cli.hub import Public, RepoName, Revision, features_text, readme
+from shapechanger.cli.console import counted, print_table, say
+from shapechanger.cli.env_arguments import Public, RepoName, Revision
 from shapechanger.demos.episodes import (
     Drop,
     Episode,
@@ -37,7 +37,6 @@ from shapechanger.errors import DemosError, HubError
 from shapechanger.files import require_file, write_atomic
 from shapechanger.reports.numbers import duration_text, shares_text
 
-_WIDEST: Final = 400
 _Data = Annotated[
     Path,
     tyro.conf.Positional,
@@ -59,14 +58,12 @@ class DemosList:
     data: _Data
 
     def run(self) -> None:
-        table = Table(box=None, pad_edge=False)
-        for name in ("episode", "of", "when (UTC)"):
-            table.add_column(name)
-        for name in ("steps", "length"):
-            table.add_column(name, justify="right")
-        table.add_column("drivers")
-        table.add_column("marks", justify="right")
-        table.add_column("outcome")
+        table = Table(
+            Column("episode", overflow="fold"),  # A truncated name could not be typed.
+            *("of", "when (UTC)", "steps", "length", "drivers", "marks", "outcome"),
+            box=None,
+            pad_edge=False,
+        )
         found = _read_all(self.data)
         for path, one in found.items():
             if isinstance(one, DemosError):
@@ -83,10 +80,7 @@ class DemosList:
                 str(len(one.marks) or ""),
                 one.outcome if one.closed else "not closed",
             )
-        console = plain_console()
-        # Truncated names could not be typed; let the terminal wrap the line.
-        needed = console.measure(table, options=console.options.update(width=_WIDEST)).maximum
-        plain_console(width=max(console.width, needed)).print(table)
+        print_table(table)
         whole = [one for one in found.values() if isinstance(one, Episode)]
         say(_totals(len(found), whole))
         _say_broken(found)
@@ -432,14 +426,14 @@ def _recording_card(episodes: list[Episode], hashes: dict[str, str], repo: str) 
     }
     shown = list(hashes.items())[:_MOST_HASHES]
     rows |= {f"SHA-256 of {name}": digest for name, digest in shown}
-    return readme(
+    return hub.readme(
         repo,
         ["demonstrations"],
         "Demonstrations, recorded with Shapechanger.",
         rows,
         {
-            "State": features_text(header.states if header.state_layout else None, "none"),
-            "Action": features_text(header.actions),
+            "State": hub.features_text(header.states if header.state_layout else None, "none"),
+            "Action": hub.features_text(header.actions),
         },
         header.source,
         f"shapechanger demos pull {repo} --out data",

@@ -59,7 +59,6 @@ class Kinematics:
         compliance: Stretch per newton, m/N; near 0 for stiff tendons.
         compliance_sd: Standard error of `compliance`, m/N.
         joint_noise: Standard deviation of measured angles, rad, (4,).
-        length_noise: Standard deviation of the lengths' residuals, m.
         angles: Estimates of the true angles, rad, (n, 4).
     """
 
@@ -68,7 +67,6 @@ class Kinematics:
     compliance: float
     compliance_sd: float
     joint_noise: NDArray[np.float64]
-    length_noise: float
     angles: NDArray[np.float64]
 
     @property
@@ -110,7 +108,6 @@ def fit_kinematics(log: FingerLog) -> Kinematics:
         compliance=float(x[-3] * _UNITS[-3]),
         compliance_sd=float(np.sqrt(spread[-3, -3])),
         joint_noise=noise,
-        length_noise=length_noise,
         angles=data.angles - data.angle_errors(x, noise, everywhere),
     )
 
