@@ -74,28 +74,24 @@ class SuiteRun(StudyRuns):
     """The suite's folder; results/NAME if not given."""
 
     def run(self) -> None:
-        suite = load_suite(self.name)
+        page = _Page(self.name, self.out)
         given = {name: getattr(self, name) for name in ("seeds", "steps", "source_steps", "seed")}
         chosen = msgspec.structs.replace(
-            suite, **{name: value for name, value in given.items() if value is not None}
+            page.suite, **{name: value for name, value in given.items() if value is not None}
         )
         check_seed(chosen.seed, StudyError)
-        allow_own_modules(suite.learner, *suite.arms)
-        with located_errors(self.name):
-            tasks = dict(suite_tasks(suite))
+        tasks = page.tasks
         for name in self.only:
             if name not in tasks:
                 raise UnknownName("study", name, tasks)
-        out = self.out or Path("results", Path(self.name).stem)
         executor = self.made_executor()
         failed: list[str] = []
-        page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in self.only or tasks:
             with located_errors(self.name):
                 traits = inspect_task(tasks[name])
                 plan = _plan(chosen, tasks[name], traits)
             try:
-                folder = open_study_folder(plan, out, name)
+                folder = open_study_folder(plan, page.out, name)
                 runs = unfinished_runs(plan, folder)
                 study = run_showing_progress(plan, folder, runs, executor=executor, traits=traits)
             except FailedRuns as error:
@@ -164,16 +160,13 @@ class SuiteMerge:
     """The folder to write; results/NAME if not given."""
 
     def run(self) -> None:
-        suite = load_suite(self.name)
-        allow_own_modules(suite.learner, *suite.arms)
-        tasks = dict(suite_tasks(suite))
-        out = self.out or Path("results", Path(self.name).stem)
+        page = _Page(self.name, self.out)
+        tasks, out = page.tasks, page.out
         if out.resolve() in [folder.resolve() for folder in self.folders]:
             raise StudyError(f"{out} is one of the folders to merge: give another --out.")
         for folder in self.folders:
             if not any((folder / name / PLAN_FILE).exists() for name in tasks):
                 raise StudyError(f"{folder} holds no study of the suite {self.name}.")
-        page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in tasks:
             parts = [one / name for one in self.folders if (one / name / PLAN_FILE).exists()]
             if not parts:
@@ -236,31 +229,33 @@ def _progress_table(out: Path) -> tuple[Table, bool]:
 class _Page:
     """The page of a suite, written again whenever a study has ended."""
 
-    def __init__(
-        self, suite: SuiteFile, name: str, out: Path, tasks: dict[str, TransferTask]
-    ) -> None:
-        self._suite, self._name, self._out, self._tasks = suite, name, out, tasks
+    def __init__(self, name: str, out: Path | None) -> None:
+        self.suite = load_suite(name)
+        allow_own_modules(self.suite.learner, *self.suite.arms)
+        with located_errors(name):
+            self.tasks = dict(suite_tasks(self.suite))
+        self._name = Path(name).stem
+        self.out = out or Path("results", self._name)
         self._strips: dict[str, list[FilmStrip]] = {}
         self._studies = {
-            one: read_json(out / one / STUDY_FILE, Study, f"delete {out / one}")
-            for one in tasks
-            if (out / one / STUDY_FILE).exists()
+            one: read_json(self.out / one / STUDY_FILE, Study, f"delete {self.out / one}")
+            for one in self.tasks
+            if (self.out / one / STUDY_FILE).exists()
         }
 
     def add(self, name: str, study: Study) -> None:
         """Add a study that has ended, or replace it; write its report and the page."""
-        write_study_report(study, self._out / name)
+        write_study_report(study, self.out / name)
         self._studies[name] = study
         for one in self._studies:
             if one not in self._strips or one == name:
                 # Without a way to render, the page has no films.
                 with suppress(RenderError):
-                    self._strips[one] = film_study(
-                        self._studies[one], self._out / one, self._out / one / _FILM
-                    )
-        ordered, swept, sweep = self._ordered(), self._suite.sweep, None
-        if swept and len(self._suite.sources) == 1 and not self._suite.targets:
-            values = dict(zip(self._tasks, swept.values, strict=True))
+                    folder = self.out / one
+                    self._strips[one] = film_study(self._studies[one], folder, folder / _FILM)
+        ordered, swept, sweep = self._ordered(), self.suite.sweep, None
+        if swept and len(self.suite.sources) == 1 and not self.suite.targets:
+            values = dict(zip(self.tasks, swept.values, strict=True))
             sweep = Sweep(
                 f"{swept.field} of {swept.edit.get('edit', 'the edit')}",
                 {one: values[one] for one in ordered},
@@ -268,22 +263,22 @@ class _Page:
         page = suite_html(
             self._name,
             ordered,
-            seeds=self._suite.seeds,
+            seeds=self.suite.seeds,
             strips=self._strips,
             films={one: f"{one}/{_FILM}" for one, strips in self._strips.items() if strips},
             sweep=sweep,
         )
-        path = self._out / "index.html"
+        path = self.out / "index.html"
         write_atomic(path, page.encode())
-        write_json(self._out / _SUMMARY, self.outcomes())
-        say(f"wrote {self._out / name / 'report.html'} and {path}")
+        write_json(self.out / _SUMMARY, self.outcomes())
+        say(f"wrote {self.out / name / 'report.html'} and {path}")
 
     def outcomes(self) -> list[StudyOutcome]:
         """Return the outcome of each study, in the order of the suite."""
         return [study_outcome(name, study) for name, study in self._ordered().items()]
 
     def _ordered(self) -> dict[str, Study]:
-        return {one: self._studies[one] for one in self._tasks if one in self._studies}
+        return {one: self._studies[one] for one in self.tasks if one in self._studies}
 
 
 def _print_outcomes(found: list[StudyOutcome]) -> None:

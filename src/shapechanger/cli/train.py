@@ -25,8 +25,8 @@ from shapechanger.transfer.runs import learner_of
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Evaluation
 
-# Trains with a callback that takes the number of steps done, and writes the policy.
-_Training = Callable[[Callable[[int], None]], None]
+# Trains a policy, with a callback that takes the number of steps done.
+_Training = Callable[[Callable[[int], None]], Any]
 
 
 @dataclass(frozen=True)
@@ -61,21 +61,19 @@ class Train:
             draw = BodyDraw(count=self.bodies, seed=self.seed)
             env = env.having({"bodies": msgspec.to_builtins(draw)})
         out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
-        steps, training = (
-            self._by_learner(env, out)
-            if self.teacher is None
-            else self._by_teacher(env, out, self.teacher)
-        )
+        by = self._by_learner(env) if self.teacher is None else self._by_teacher(env, self.teacher)
+        steps, training = by
         require_file(out)  # The policy is written last; check first that it can be.
         use_one_thread()
         try:
             with StudyProgress({env.id: steps}) as progress:
-                training(lambda done: progress(env.id, done, False))
+                policy = training(lambda done: progress(env.id, done, False))
         except KeyboardInterrupt:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
+        policy.carded(command=command_line()).save(out)
         say(f"wrote {out}")
 
-    def _by_learner(self, env: EnvRef, out: Path) -> tuple[int, _Training]:
+    def _by_learner(self, env: EnvRef) -> tuple[int, _Training]:
         """Return the number of steps, and the training by a learner, after checking both."""
         wanted = self.learner or ("limbs" if self.bodies else default_learner(env))
         if self.bodies:
@@ -101,7 +99,7 @@ class Train:
             make_folder(self.tensorboard)
         whole = settings.whole_updates(steps)
 
-        def training(on_steps: Callable[[int], None]) -> None:
+        def training(on_steps: Callable[[int], None]) -> Any:
             say(f"{learner}: {tuning_text(learner, env.id)}")
             more: dict[str, Any] = {}
             if "demonstrations" in settings.takes:
@@ -109,19 +107,12 @@ class Train:
                 file = Path("results", "demonstrations", name)
                 more["demonstrations"] = SharedFile(file, self.seed)
             trains.threads, trains.tensorboard = None, self.tensorboard
-            policy = trains.train(
-                env,
-                whole,
-                self.seed,
-                on_evaluation=_print_evaluation,
-                on_steps=on_steps,
-                **more,
-            )
-            policy.carded(command=command_line()).save(out)
+            more |= {"on_evaluation": _print_evaluation, "on_steps": on_steps}
+            return trains.train(env, whole, self.seed, **more)
 
         return whole, training
 
-    def _by_teacher(self, env: EnvRef, out: Path, teacher: Path) -> tuple[int, _Training]:
+    def _by_teacher(self, env: EnvRef, teacher: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training of a student of another policy."""
         from shapechanger.vehicles.cloning import STUDENT_STEPS, train_student  # PyTorch.
 
@@ -133,9 +124,8 @@ class Train:
             )
         steps = STUDENT_STEPS if self.steps is None else self.steps
 
-        def training(on_steps: Callable[[int], None]) -> None:
-            policy = train_student(env, load_policy(teacher), steps, self.seed, on_steps=on_steps)
-            policy.carded(command=command_line()).save(out)
+        def training(on_steps: Callable[[int], None]) -> Any:
+            return train_student(env, load_policy(teacher), steps, self.seed, on_steps=on_steps)
 
         return steps, training
 
