@@ -31,7 +31,7 @@ def say(text: str, *, stderr: bool = False) -> None:
 
 
 def print_table(table: Table) -> None:
-    """Print a table, as wide as the terminal, or as its content where there is none."""
+    """Print a table, as wide as the terminal, or as its content in a file."""
     console = plain_console()
     if not console.is_terminal:
         widest = console.options.update(width=_WIDEST)
