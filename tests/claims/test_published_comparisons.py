@@ -69,3 +69,83 @@ def test_differences_between_limbs_and_padding_are_those_of_the_runs():
         )
         mean, low, high = difference(ours, theirs)
         assert f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]" in text, split
+
+
+def test_the_atlas_compares_methods_as_the_runs_do(pairs):
+    def above(arm, among):
+        """Return the probability that a run ends above a fine-tuned one on the same pair."""
+        wins = [
+            np.mean(
+                np.greater.outer(at_the_end(pairs[pair][arm]), at_the_end(pairs[pair]["fine-tune"]))
+            )
+            for pair in among
+        ]
+        return f"{np.mean(wins):.2f}"
+
+    extended = [pair for pair in pairs if "ExtendedAnt" in pair]
+    others = [pair for pair in pairs if "ExtendedAnt" not in pair]
+    text = " ".join(ATLAS.split())
+    row = [above(arm, pairs) for arm in ("scratch", "frozen-trunk", "evolution")]
+    assert (
+        "| **probability to end above fine-tune** | {} | | {} [0.40, 0.61] | {} [".format(*row)
+        in text
+    )
+    assert f"is {above('evolution', extended)} [0.15, 0.39]" in text
+    assert f"probability of {above('evolution', others)} [0.44, 0.74]" in text
+
+
+def test_from_a_body_that_walks_every_fine_tuned_run_ends_ahead(pairs):
+    walking = {pair: runs for pair, runs in pairs.items() if not pair.startswith("ExtendedAnt")}
+    early = 0
+    for runs in walking.values():
+        scratch = at_the_end(runs["scratch"])
+        assert min(at_the_end(runs["fine-tune"])) > max(scratch)
+        curve = np.mean([run["values"] for run in runs["fine-tune"]], axis=0)
+        early += int(np.argmax(curve >= np.mean(scratch))) <= (len(curve) - 1) // 2
+    assert (len(walking), early) == (9, 8)
+
+
+def test_the_atlas_states_how_fast_sources_walk_and_big_ants_zero_shot(pairs):
+    def ends(source):
+        runs = next(runs for pair, runs in pairs.items() if pair.startswith(f"{source}-to"))
+        return " to ".join(f"{one(at_the_end(runs['source'])):.1f}" for one in (min, max))
+
+    text = " ".join(ATLAS.split())
+    assert f"walk at {ends('ExtendedAnt')} m/s" in text
+    assert f"{ends('AmputatedAnt')} m/s and at {ends('BigAnt')}, the ant's at {ends('Ant')}" in text
+    speeds = [np.mean(run["values"]) for run in pairs["Ant-to-BigAnt"]["zero-shot"]]
+    assert f"{min(speeds):.2f} to {max(speeds):.2f} over seeds" in text
+
+
+def test_the_share_of_speed_that_policies_of_limbs_keep():
+    runs = load("generalist-runs")
+    text = " ".join(MANY_BODIES.split())
+    kept = {}
+    for network in ("limbs", "padded"):
+        mine = [run for run in runs if run["network"] == network]
+        speed = {key: np.mean([run["splits"][key] for run in mine]) for key in mine[0]["splits"]}
+        speed["extended"] = np.mean([run["extended"] for run in mine])
+        kept[network] = {key: f"{100 * one / speed['train']:.0f}" for key, one in speed.items()}
+    ours = [kept["limbs"][key] for key in ("interpolation", "extrapolation", "composition")]
+    assert (
+        "it keeps {} % in interpolation, {} % in extrapolation and {} % in composition".format(
+            *ours
+        )
+        in text
+    )
+    theirs = [kept["padded"][key] for key in ("interpolation", "extrapolation", "composition")]
+    assert "padded policies keep {}, {} and {} %".format(*theirs) in text
+    rows = {row["name"]: float(row["value"].split()[0]) for row in load("generalist-gpu")["rows"]}
+    gpu = {name.split(": ")[0].removeprefix("32 ants, "): one for name, one in rows.items()}
+    share = [
+        f"{100 * gpu[key] / gpu['train']:.0f}"
+        for key in ("interpolation", "extrapolation", "composition", "ExtendedAnt, zero-shot")
+    ]
+    both = [
+        one for two in zip(share, [*ours, kept["limbs"]["extended"]], strict=True) for one in two
+    ]
+    assert (
+        "keeps {} % in interpolation ({} % with 32 ants), {} % in extrapolation ({} %), {} % in compositions ({} %), "
+        "and {} % with 12 joints ({} %)".format(*both)
+        in text
+    )
