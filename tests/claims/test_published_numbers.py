@@ -30,7 +30,7 @@ TABLES: Final = [
     ("vehicles", "labels |", "vehicles-waypoints-labels", "{0} to {1}:"),
     ("vehicles", " | without the robot", "vehicles-waypoints-robot", ", {0} in the whole robot"),
     ("vehicles", "camera |", "vehicles-waypoints-cameras", "{0}"),
-    ("vehicles", "judged in the |", "vehicles-waypoints-worlds vehicles-waypoints", "{1} to {0}:"),
+    ("vehicles", "evaluated in the |", "vehicles-waypoints-worlds vehicles-waypoints", "{1} to {0}:"),
     (
         "vehicles",
         "from → to | zero-shot | scratch",
