@@ -11,6 +11,9 @@ from typing import Final
 
 import pytest
 
+from shapechanger.errors import WorldError
+from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
+
 ROOT: Final = Path(__file__).parents[2]
 NUMBER: Final = re.compile(r"(?<![\w.])[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
 
@@ -30,7 +33,12 @@ TABLES: Final = [
     ("vehicles", "labels |", "vehicles-waypoints-labels", "{0} to {1}:"),
     ("vehicles", " | without the robot", "vehicles-waypoints-robot", ", {0} in the whole robot"),
     ("vehicles", "camera |", "vehicles-waypoints-cameras", "{0}"),
-    ("vehicles", "evaluated in the |", "vehicles-waypoints-worlds vehicles-waypoints", "{1} to {0}:"),
+    (
+        "vehicles",
+        "evaluated in the |",
+        "vehicles-waypoints-worlds vehicles-waypoints",
+        "{1} to {0}:",
+    ),
     (
         "vehicles",
         "from → to | zero-shot | scratch",
@@ -96,6 +104,7 @@ SENTENCES: Final = [
     ("finger-rig", "5.2 to 7.4 ms", "finger-path", "delay"),
     ("finger-rig", "end 1.0 degrees RMS", "finger-path", "with its path"),
     ("finger-rig", "4.2 without", "finger-path", "without a path"),
+    ("robots", "in 9 of 20 trials", "robot-faults", "no one-shot fitted"),
     ("identify", "13 %; median 0.6 %; below 5 % in 12 of 20", "finger-identify", "largest error"),
     ("identify", "| 96 %", "finger-identify", "hold the truth"),
     ("identify", "2.7 % in the median, 11 % at most", "finger-identify", "hold the truth"),
@@ -229,6 +238,33 @@ def test_fingers_below_80_percent_are_counted_and_named(header: str, file: str) 
 def test_sentences(name: str, sentence: str, file: str, row: str) -> None:
     assert sentence in " ".join(page(name).split())
     assert unbacked(sentence, file, row) == []
+
+
+@pytest.mark.parametrize(
+    ("size", "fovy_deg", "row"),
+    [
+        ((160, 120), 48.8, "yes, pitched from -7 to 11 degrees"),
+        ((160, 90), 41.0, "yes, pitched from -4 to 7 degrees"),
+        ((160, 120), 41.0, "no: it misses 20 %"),
+        ((160, 90), 67.0, "| 67 | yes |"),
+        ((160, 120), 41.4, "no: it misses 18 %"),
+    ],
+)
+def test_cameras_for_waypoints(size: tuple[int, int], fovy_deg: float, row: str) -> None:
+    """The table of docs/profiles.md states which cameras see enough, at which whole pitches."""
+    assert row in page("profiles")
+    if missed := re.search(r"misses (\d+) %", row):
+        with pytest.raises(WorldError, match=rf"misses {missed[1]} %"):
+            Rectifier(CameraGeometry(0.0, fovy_deg), size)
+        return
+    Rectifier(CameraGeometry(0.0, fovy_deg), size)
+    if pitches := re.search(r"from (\S+) to (\S+) degrees", row):
+        low, high = (float(one) for one in pitches.groups())
+        for pitch_deg in (low, high):
+            Rectifier(CameraGeometry(pitch_deg, fovy_deg), size)
+        for pitch_deg in (low - 1.0, high + 1.0):
+            with pytest.raises(WorldError, match="misses"):
+                Rectifier(CameraGeometry(pitch_deg, fovy_deg), size)
 
 
 def test_a_wrong_number_is_found() -> None:
