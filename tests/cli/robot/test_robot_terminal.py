@@ -1,7 +1,6 @@
 """Driving and calibrating a twin from a terminal."""
 
 import sys
-import time
 import tomllib
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -17,7 +16,6 @@ from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.client.known_robots import recall, remember
-from shapechanger.robot.client.teleop import REST_WAIT_S
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
@@ -109,7 +107,6 @@ def _at_the_terminal(
 
             def leaves() -> bool:
                 person.press("q")  # Just after Escape it belongs to a sequence.
-                time.sleep(1.1 * REST_WAIT_S)
                 return person.process.poll() is not None
 
             person.wait_for(leaves)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import math
 import os
 import re
@@ -57,7 +58,15 @@ class HeldKeys:
         self._held: dict[str, _Held] = {}
 
     def press(self, key: str, now_s: float) -> bool:
-        """Register a key press at a time, s, and return whether it is a direction key."""
+        """Register a key press.
+
+        Args:
+            key: Name of the key.
+            now_s: Time of the press, s.
+
+        Returns:
+            Whether it is a direction key.
+        """
         if key not in DIRECTIONS:
             return False
         action, value = DIRECTIONS[key]
@@ -73,7 +82,12 @@ class HeldKeys:
         return True
 
     def value(self, action: str, now_s: float) -> float:
-        """Return the held value of an action, such as "steering", at a time, s: -1, 0 or 1."""
+        """Return the held value of an action: -1, 0 or 1.
+
+        Args:
+            action: Name of the action, such as "steering".
+            now_s: Present time, s.
+        """
         held = self._held.get(action)
         return held.value if held is not None and now_s <= held.until_s else 0.0
 
@@ -86,83 +100,154 @@ STOPS: Final = frozenset({"space", "escape"})
 """Keys that stop the robot."""
 
 OTHER: Final = "other"
-"""Name of all other input, such as control characters, and of everything within `REST_WAIT_S` after
-input that is not understood."""
+"""Name of all other input: function keys, Alt and Ctrl combinations, pasted text, mouse reports and
+replies of the terminal."""
 
 ESCAPE_WAIT_S: Final = 0.05
 """Time after which an escape character is the key Escape, s. Terminals send a sequence at once, so
 its second character follows within a few milliseconds, also over SSH."""
 
 REST_WAIT_S: Final = 0.5
-"""Time without input, s, after which keys count again when input was not understood."""
+"""Time that a sequence waits for its next character, s. Later characters are keys again, because
+Alt+[ looks like the beginning of a sequence that never ends."""
 
-_ARROW: Final = re.compile(rb"\x1b[\[O]([ABCD])")
-_BEGUN: Final = frozenset({b"\x1b", b"\x1b[", b"\x1bO"})  # Beginnings of an arrow.
-_ARROWS: Final = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
-_NAMES: Final = {
-    b" ": "space",
-    b"\x00": "space",
-    b"\r": "enter",
-    b"\n": "enter",
-}  # NUL: Ctrl+Space.
+_ESCAPE: Final = "\x1b"
+_ARROWS: Final = {
+    f"{_ESCAPE}{kind}{letter}": key
+    for kind in "[O"
+    for letter, key in {"A": "up", "B": "down", "C": "right", "D": "left"}.items()
+}
+_NAMES: Final = {" ": "space", "\x00": "space", "\r": "enter", "\n": "enter"}  # NUL: Ctrl+Space.
+# Control strings: DCS, SOS, OSC, PM and APC. Only an OSC may end with BEL (xterm's "ctlseqs").
+_STRINGS: Final = frozenset("PX]^_")
+# Characters that follow a CSI sequence without parameters: F1 to F5 of Linux' console, and mouse
+# reports in the encoding of X10 and with highlights (xterm's "ctlseqs").
+_TAILS: Final = {"[": 1, "M": 3, "t": 2, "T": 6}
+# Escape and Space where a program has left kitty's protocol or xterm's modifyOtherKeys enabled;
+# ":3" is a release.
+_STOP_CODES: Final = re.compile(
+    rf"{_ESCAPE}[\[O](?:(27|32)(?:;(?!\d*:3)[\d:;]*)?u|27;\d+;(27|32)~)"
+)
+_PASTES: Final = {f"{_ESCAPE}[200~": True, f"{_ESCAPE}[201~": False}  # Begin and end.
+_LONGEST: Final = 64  # The middle of a longer sequence is dropped.
 
 
 class NoTerminal(ShapechangerError, RuntimeError):
     """There is no terminal to read keys from."""
 
 
+def _is_whole(text: str) -> bool:
+    """Return whether a sequence, from its escape character on, has its last character."""
+    kind, rest = text[1:2], text[2:]
+    if not text.startswith(_ESCAPE):  # A character of another encoding.
+        return bool(kind)
+    if kind in _STRINGS:
+        return kind == "]" and rest.endswith("\x07")
+    if kind not in "[O" and not " " <= kind <= "/":
+        return True  # Alt and a key, or the end of a string.
+    if kind == "[" and rest[:1] in _TAILS:
+        return len(rest) > _TAILS[rest[0]]
+    return "@" <= rest[-1:] <= "~"
+
+
 class KeyParser:
     r"""Parser of terminal input into keys.
 
-    An escape character that does not begin an arrow is Escape, which stops: a function key, pasted
-    text, a mouse report, or Escape itself in kitty's protocol. All later input up to a pause of
-    `REST_WAIT_S` may belong to the same sequence, so it is `OTHER`, except for further stops.
+    Sequences (ECMA-48 and xterm's "ctlseqs") are recognised even if they are split over several
+    reads, and unknown ones become `OTHER`, never letters. Only Space and Escape count within a
+    sequence or within pasted text, because a stop must never be lost.
 
-    >>> KeyParser().feed(b"wW\x1b[A\x1b[1;5D e", now_s=0.0)
-    ['w', 'w', 'up', 'escape', 'other', 'other', 'other', 'other', 'other', 'space', 'other']
+    >>> KeyParser().feed(b"wW\x1b[A\x1b[1;5D \x1be", now_s=0.0)
+    ['w', 'w', 'up', 'other', 'space', 'other']
     """
 
     def __init__(self) -> None:
-        self._begun = b""  # An arrow that has begun.
-        self._last_s = -math.inf  # Time of the last input.
-        self._is_lost = False  # Whether input since the last pause was not understood.
+        # A byte that is not UTF-8 becomes a lone surrogate.
+        self._decoder = codecs.getincrementaldecoder("utf-8")("surrogateescape")
+        self._text = ""  # Sequence that has begun.
+        self._is_reported = False  # It was reported as Escape, so its rest is ignored.
+        self._is_pasted = False
+        self._last_s = 0.0
 
     @property
     def due_s(self) -> float:
         """Time at which `expire` returns keys, s; infinity if nothing is pending."""
-        return self._last_s + ESCAPE_WAIT_S if self._begun else math.inf
+        if not self._text:
+            return math.inf
+        is_alone = self._text == _ESCAPE and not self._is_reported
+        return self._last_s + (ESCAPE_WAIT_S if is_alone else REST_WAIT_S)
 
     def feed(self, data: bytes, now_s: float) -> list[str]:
-        """Parse bytes that were read at a time, s.
+        """Parse input.
+
+        Args:
+            data: The bytes.
+            now_s: Time at which they were read, s.
 
         Returns:
             The keys: letters in lower case, "up", "down", "left", "right", "space", "escape",
             "enter" and `OTHER`.
         """
         keys = self.expire(now_s)
-        self._is_lost &= now_s - self._last_s < REST_WAIT_S
-        self._last_s = now_s
-        data = self._begun + data
-        while data and data not in _BEGUN:
-            arrow, char = _ARROW.match(data), data[:1]
-            data = data[arrow.end() if arrow else 1 :]
-            if arrow:
-                key = _ARROWS[arrow[1]]
-            elif char == b"\x1b":
-                key = "escape"
-            else:
-                key = _NAMES.get(char, char.decode().lower() if b"!" <= char <= b"~" else OTHER)
-            keys.append(OTHER if self._is_lost and key not in STOPS else key)
-            self._is_lost |= key in {"escape", OTHER}
-        self._begun = data
+        text = self._decoder.decode(data)
+        for char in text:
+            key = self._key(char)
+            if key is not None:
+                keys.append(OTHER if self._is_pasted and key not in STOPS else key)
+        # Half a character does not delay Escape.
+        if text or self._is_reported or self._text != _ESCAPE:
+            self._last_s = now_s
         return keys
 
     def expire(self, now_s: float) -> list[str]:
-        """Return Escape if the rest of an arrow has not come by a time, s, as it should have."""
-        if now_s < self.due_s:
-            return []
-        self._begun, self._is_lost = b"", True
-        return ["escape"]
+        """Return the keys of sequences whose rest did not come in time.
+
+        Args:
+            now_s: Present time, s.
+        """
+        keys: list[str] = []
+        if self._text == _ESCAPE and not self._is_reported and now_s >= self.due_s:
+            keys.append("escape")
+            self._is_reported = True
+            self._is_pasted = False  # The end of the pasted text was lost.
+        if now_s >= self.due_s:
+            keys += [] if self._is_reported else [OTHER]
+            self._text = ""
+        return keys
+
+    def _key(self, char: str) -> str | None:
+        """Advance by one character, and return the key that it completes."""
+        code = ord(char) - 0xDC00 if "\udc80" <= char <= "\udcff" else ord(char)
+        is_byte = code != ord(char)
+        if char in {" ", "\x00"}:
+            self._text += " " if self._text == _ESCAPE else ""
+            return "space"
+        if char == _ESCAPE:
+            self._is_reported = self._text == _ESCAPE and not self._is_reported
+            self._text = _ESCAPE
+            return "escape" if self._is_reported else None
+        if 0x80 <= code < 0xA0:  # C1 controls: ESC and a character of seven bits.
+            if self._text[1:2] in _STRINGS and code != 0x9C:
+                return None
+            self._text, introducer = "", chr(code - 0x40)
+            if not is_byte or introducer in {"[", "O", "\\", *_STRINGS}:
+                self._text, self._is_reported, char = _ESCAPE, False, introducer
+        if not self._text:
+            if not is_byte:
+                return _NAMES.get(char, char.lower() if "!" <= char <= "~" else OTHER)
+            # A character of another encoding, whose second byte may be a letter's.
+            self._text, self._is_reported = char, False
+            return None
+        text = self._text = self._text[:_LONGEST] + char
+        if not _is_whole(text):
+            return None
+        self._text = ""
+        self._is_pasted = _PASTES.get(text, self._is_pasted)
+        if self._is_reported:
+            return None
+        if stop := _STOP_CODES.fullmatch(text):
+            return "escape" if "27" in stop.groups() else "space"
+        return _ARROWS.get(text, OTHER)
 
 
 def _as_typed(keys: list[str]) -> list[str]:
