@@ -182,7 +182,7 @@ def fuzz(
                 raise AssertionError(f"A stranger was let in with {data!r}.")
             continue
         if known is None:
-            known = Session(number, hub, Authenticator(), messages_per_s=1e9)
+            known = Session(number, hub, Authenticator())
             known.introduce(encode(Hello(version=VERSION, proof=b"", name="known")))
             known.observe()
         try:

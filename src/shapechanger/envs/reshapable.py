@@ -70,8 +70,9 @@ class Reshapable(MujocoEnv):
     - `shadows`: whether frames have shadows, reflections and smoothed edges. By default, frames of
       more than 256 x 256 pixels have them, and smaller ones, which render twenty times faster
       without them, do not.
-    - `fast_model`: whether a cheaper model with bit-equal motion may step the physics. Ants and
-      pendulums have such a model; other envs accept the argument and ignore it.
+    - `fast_model`: whether a cheaper model with bit-equal motion may step the physics, while
+      MuJoCo's profiling clock (`data.timer`) is paused. Ants and pendulums have such a model;
+      other envs accept the argument and ignore it.
     - `towards`: another body of the family with the same spaces. Each reset then draws the body
       uniformly between `body` and it, unless the reset gives a body.
 

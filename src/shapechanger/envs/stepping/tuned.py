@@ -7,6 +7,7 @@ import hashlib
 import sys
 import threading
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from operator import attrgetter
@@ -31,6 +32,48 @@ _searching: Final = threading.Lock()
 Outcomes = tuple[NDArray[np.float64], NDArray[Any], NDArray[np.bool_], dict[str, Any]]
 """Results of one step of n envs of one kind: observations, shape (n, size); rewards and ends, shape
 (n,); and one value per env for each key of an info."""
+
+
+class PausedClock:
+    """Context in which MuJoCo's profiling clock is paused, for all threads.
+
+    A step of an ant reads the clock hundreds of times to fill `data.timer`, on which no other
+    number depends. `mujoco.set_mjcb_time(None)` installs the clock again, so its pointer is set. A
+    clock that a user installs is kept.
+
+    Args:
+        clock: Pointer to the clock function.
+    """
+
+    def __init__(self, clock: ctypes.c_void_p) -> None:
+        self._clock = clock
+        self._usual = clock.value
+        self._inside = 0
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self._inside += 1
+            if self._clock.value == self._usual:
+                self._clock.value = None
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if not self._inside and self._clock.value is None:
+                self._clock.value = self._usual
+
+
+@cache
+def paused_clock() -> AbstractContextManager[None]:
+    """Return the context that pauses the clock; it does nothing if a user has installed one."""
+    if mujoco.get_mjcb_time() is not None:
+        return nullcontext()
+    try:
+        bindings = ctypes.CDLL(cast("Any", mujoco)._callbacks.__file__)
+        return PausedClock(ctypes.c_void_p.in_dll(bindings, "mjcb_time"))
+    except (AttributeError, OSError, ValueError):  # pragma: no cover  # Another MuJoCo build.
+        return nullcontext()
 
 
 # Arrays closer than this in memory, bytes, are compared together with the bytes between them.
@@ -135,6 +178,7 @@ class Binding:
         self.ctrl, self.qpos, self.qvel = data.ctrl, data.qpos, data.qvel
         self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[BAD_STATE]
         self.kind: str | None = None
+        self._clock = paused_clock() if env.fast_model else nullcontext()
         if env.fast_model and watch.shared.fast is not None:
             self.step_with(watch.shared.fast)
 
@@ -145,8 +189,9 @@ class Binding:
 
     def move(self) -> None:
         """Step the physics."""
-        mujoco.mj_step(self.stepping, self.data, self.frame_skip)
-        mujoco.mj_rnePostConstraint(self.stepping, self.data)
+        with self._clock:
+            mujoco.mj_step(self.stepping, self.data, self.frame_skip)
+            mujoco.mj_rnePostConstraint(self.stepping, self.data)
 
 
 class TunedStep(Reshapable):
