@@ -17,6 +17,7 @@ from pathlib import Path
 
 from shapechanger.errors import LinkError
 from shapechanger.layout import Feature, Layout
+from shapechanger.robot.daemon import session
 from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
@@ -165,6 +166,7 @@ def fuzz(
     orders: list[Order] = []
     clock = _Clock()
     hub = SessionHub(PLAN, clock, orders.append)
+    session.MESSAGES_PER_S = 1e9  # Refused messages would test nothing.
     owner = Session(0, hub, Authenticator())
     owner.introduce(encode(Hello(version=VERSION, proof=b"", role="person", name="owner")))
     owner.receive(encode(Take()))
