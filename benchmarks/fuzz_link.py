@@ -14,6 +14,7 @@ import random
 import time
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import patch
 
 from shapechanger.errors import LinkError
 from shapechanger.layout import Feature, Layout
@@ -149,6 +150,7 @@ def _drained(session: Session) -> None:
         pass
 
 
+@patch.object(session, "MESSAGES_PER_S", 1e9)  # Refused messages would test nothing.
 def fuzz(
     count: int, seed: int = 0, progress: Callable[[int], None] = lambda _: None
 ) -> collections.Counter[str]:
@@ -166,7 +168,6 @@ def fuzz(
     orders: list[Order] = []
     clock = _Clock()
     hub = SessionHub(PLAN, clock, orders.append)
-    session.MESSAGES_PER_S = 1e9  # Refused messages would test nothing.
     owner = Session(0, hub, Authenticator())
     owner.introduce(encode(Hello(version=VERSION, proof=b"", role="person", name="owner")))
     owner.receive(encode(Take()))
