@@ -93,7 +93,7 @@ def fifo(tmp_path: Path) -> Path:
 
 
 def test_a_pipe_returns_the_newest_frame_and_its_time(fifo: Path) -> None:
-    """Older frames in the pipe are skipped, and so are bytes between frames."""
+    """Older frames in the pipe are skipped, and so are bytes between frames, which are counted."""
     camera = open_camera(_plan("pipe", path=str(fifo)))
     old, new = (with_comment(jpeg_of(n), b"captured_ns=%d" % n) for n in (10, 90))
     with fifo.open("wb", buffering=0) as writer:
@@ -102,16 +102,16 @@ def test_a_pipe_returns_the_newest_frame_and_its_time(fifo: Path) -> None:
         before_ns = time.monotonic_ns()
         writer.write(b"garbage" + jpeg_of(40))
         frame = camera.read()
-        assert frame.jpeg == jpeg_of(40)
+        assert (frame.jpeg, frame.skipped) == (jpeg_of(40), 7)
         assert before_ns <= frame.captured_ns <= time.monotonic_ns()
     with pytest.raises(RobotError, match="has ended"):
         camera.read()
-    camera = open_camera(_plan("pipe", path=str(fifo)))
     writing = threading.Thread(target=fifo.write_bytes, args=(jpeg_of(50),))
     writing.start()
     assert camera.read().jpeg == jpeg_of(50)  # The next writer.
     writing.join()
-    camera = open_camera(_plan("pipe", path=str(fifo)))
+    with pytest.raises(RobotError, match="has ended"):
+        camera.read()
     assert _ends_when_closed(camera, camera.read) == "The camera is closed."
 
 

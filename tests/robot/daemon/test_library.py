@@ -1,6 +1,7 @@
 """Library of recordings: exact bytes, bounded answers, nothing outside the folder."""
 
 import shutil
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,7 +19,7 @@ from shapechanger.demos.episodes import (
     edit,
     read_episode,
 )
-from shapechanger.robot.daemon.library import Answer, Question, RecordingLibrary
+from shapechanger.robot.daemon.library import Answer, LineIndex, Question, RecordingLibrary
 from shapechanger.robot.link.messages import (
     MAX_EPISODES,
     MAX_PIECE,
@@ -165,3 +166,31 @@ def test_damage_is_reported_and_the_rest_is_readable(ask: Ask, tmp_path: Path) -
     found = ask(Browse())
     assert isinstance(found, Recordings)
     assert "cannot be read" in found.episodes[0].outcome
+
+
+_parts = st.lists(st.sampled_from((b"a", b"bb\n", b"\n", b"c\rd\n", b"x" * 70_000)), max_size=12)
+
+
+@given(parts=_parts, replaced=st.sets(st.integers(0, 11)))
+def test_every_complete_line_of_a_growing_file_is_found(
+    parts: list[bytes], replaced: set[int]
+) -> None:
+    """A file that is replaced, and may be shorter then, is read again."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "lines"
+        path.touch()
+        index = LineIndex(path)
+        whole = b""
+        for number, part in enumerate(parts):
+            if number in replaced:
+                whole = b""
+                path.with_name("other").touch()
+                path.with_name("other").replace(path)
+            whole += part
+            with path.open("ab") as file:
+                file.write(part)
+            lines = whole.split(b"\n")[:-1]
+            for first, count in ((0, 100), (1, 2), (len(lines), 1)):
+                read = [line.encode() for line in index.lines(first, count)]
+                assert read == lines[first : first + count]
+            assert len(index) == len(lines)

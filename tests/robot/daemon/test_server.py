@@ -179,6 +179,8 @@ async def test_the_console_reveals_only_the_robots_name(robot: Running) -> None:
         assert "aiohttp" not in page.headers["Server"]
     async with robot.session.get(f"{robot.url}/console/main.js") as page:
         assert page.content_type == "text/javascript"
+    async with robot.session.get(f"{robot.url}/healthz") as health:
+        assert (health.status, await health.json()) == (200, {"guard": "well"})
     for path in ("/nothing", "/../etc/passwd"):
         async with robot.session.get(robot.url + path) as missing:
             assert missing.status == 404

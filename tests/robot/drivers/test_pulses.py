@@ -127,6 +127,10 @@ def test_channels_share_their_chip() -> None:
     hardware = FakeHardware({0x40: _asleep()})
     servos = [hardware.output("servo", **_ON_CHIP, channel=c) for c in range(12)]
     assert sum(register == 0xFE for _, register, _ in hardware.bus.writes) == 1
+    with pytest.raises(RobotError, match=r"Channel 3 .* used twice"):
+        hardware.output("servo", **_ON_CHIP, channel=3)
+    with pytest.raises(RobotError, match="one frequency"):
+        hardware.output("servo", **_ON_CHIP | {"hz": 60}, channel=13)
     for servo in servos:
         servo.close()
         servo.close()

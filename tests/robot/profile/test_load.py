@@ -42,9 +42,9 @@ def test_a_profile_in_the_working_folder_has_a_name(
 @pytest.mark.parametrize(
     ("name", "hint"),
     [
-        ("my-cra.toml", r"There is no file .*my-cra\.toml\. .* Did you mean 'my-car'\?"),
-        ("trcuk.toml", r"Did you mean 'truck'\?"),
-        ("zzz.toml", r"zzz\.toml\. .* There are: boat, .*, my-car\.$"),
+        ("my-cra.toml", r"There is no file .*my-cra\.toml \(did you mean my-car in .*\?\); there "),
+        ("trcuk.toml", r"\(did you mean truck of Shapechanger\?\)"),
+        ("zzz.toml", r"zzz\.toml; there are: boat, .*, my-car\.$"),
     ],
 )
 def test_a_missing_profile_has_a_nearest_spelling(tmp_path: Path, name: str, hint: str) -> None:
@@ -64,11 +64,11 @@ def test_unreadable_files_are_refused(tmp_path: Path) -> None:
     path.write_bytes(b"# One.\n\xff")
     long.write_bytes(b"#" * (1024 * 1024 + 1))
     for unread, message in (
-        (tmp_path / "gone.toml", r"There is no file .*gone\.toml\. .*There are: boat"),
-        (tmp_path, "cannot be read: .*Is a directory"),
-        (path, r"x\.toml cannot be read: 'utf-8' codec"),
+        (tmp_path / "gone.toml", r"There is no file .*gone\.toml; there are: boat"),
+        (tmp_path, "cannot be read: Is a directory"),
+        (path, r"x\.toml, line 2: this is not UTF-8 text"),
         (long, "longer than a profile can be"),
-        (path / "y.toml", r"x\.toml/y\.toml cannot be read: .*Not a directory"),
+        (path / "y.toml", r"x\.toml/y\.toml cannot be read: Not a directory"),
         ("a\0b.toml", "cannot be read: embedded null"),
     ):
         with pytest.raises(ProfileError, match=message):
@@ -167,7 +167,8 @@ def test_a_change_through_a_link_changes_its_target(rover: Path, tmp_path: Path)
     ("key", "value", "message"),
     [
         ("output.steer.centre_us", 2400, "must lie between left_us and right_us"),
-        ("output.stear.centre_us", 1500, "stear"),
+        ("output.stear.centre_us", 1500, "No table of rover.toml matches 'stear'. Did you mean"),
+        ("robot.name.x", 1500, "No table of rover.toml matches 'name'"),
         ("robot.nam", "x", r"\[robot\] has no key 'nam'"),
     ],
 )
@@ -175,7 +176,7 @@ def test_a_change_that_breaks_the_profile_is_refused(
     rover: Path, key: str, value: object, message: str
 ) -> None:
     """The file is unchanged, and no temporary file remains."""
-    with pytest.raises((ProfileError, KeyError), match=message):
+    with pytest.raises((ProfileError, UnknownName), match=message):
         rewrite(rover, {key: value})
     assert rover.read_text() == EVERYTHING
     assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]

@@ -17,14 +17,16 @@ from tests.robot.profile.texts import EVERYTHING, changed, read
 _TABLE = r"""
 [limits] -> [limit] -> no table or key 'limit' (did you mean 'limits'?); there are: act
 arming = -> armimg = -> [limits] has no key 'armimg' (did you mean 'arming'?); there are
-enable = 26 -> left_us = 1000 -> [output.drive] has no key 'left_us'; there are:
+enable = 26 -> left_us = 1000 -> 'left_us' belongs to driver = 'servo', not to [output.
+enable = 26 -> channel = 3 -> belongs to over = 'pca9685' or 'sysfs'
+flip = true -> path = "x" -> belongs to driver = 'file' or 'pipe', not to [camera]
 body = "car" -> body = { a = 1 } -> can be printed, not {'a': 1}
 name = "rover" -> name = "a\u0007" -> can be printed, not 'a\x07'
 name = "rover"\n ->  -> [robot] lacks the key 'name', a text of 1 to 64 characters -> [robot]
 control_hz = 25 -> control_hz = "25 Hz" -> a number from 1 to 100, not '25 Hz'
 control_hz = 25 -> control_hz = nan -> from 1 to 100, not nan
 2026-11-03 -> 2026-11-03T12:00:00 -> must be a date, such as 2026-11-03, not
-levels = "three" -> levels = "thre" -> one of 'any', 'three', not 'thre'
+levels = "three" -> levels = "thre" -> one of 'any', 'three', not 'thre' (did you mean 'three'?)
 seconds = 0.5 -> seconds = true -> seconds of [[reset]] number 2 must be a number above
 size = [128, 128] -> size = [128, 127] -> even number from 16 to 1920, not [128, 127]
 mix.throttle = 0.5 -> mix = "throttle" -> must be a table of numbers from -10 to 10 by
@@ -70,6 +72,8 @@ throttle = -0.4 -> throttle = -0.6 -> must have -0.5 to 1 for throttle
 throttle = -0.4 -> thrott = -0.4 -> no action: 'thrott' (did you mean
 arm = 0.5\n -> arm = 2\n -> [[reset]] number 2 must be a table of numbers -> [reset.values]
 hold_ms = 50 -> hold_ms = 10 -> must be a whole number from 30 to 1000
+name = "rover" -> name = "rover -> this is not valid TOML: illegal character
+[stop] -> [limits] -> this is not valid TOML: cannot declare ('limits',) twice at column 8
 """
 MISTAKES = [
     *(row.replace(r"\n", "\n").split(" -> ") for row in _TABLE.strip("\n").split("\n")),
@@ -134,7 +138,7 @@ def test_any_edit_gives_a_profile_or_one_sentence(cut: int, length: int, put: st
         read(EVERYTHING[:cut] + put + EVERYTHING[cut + length :])
     except ProfileError as error:
         message = str(error)
-    assert re.fullmatch(r"|rover\.toml(, line [0-9]+:| is not valid TOML:) [^\n]*\.", message)
+    assert re.fullmatch(r"|rover\.toml, line [0-9]+: [^\n]*\.", message)
 
 
 _BARE = '[robot]\nname = "x"\nbody = "y"\n'
@@ -154,11 +158,10 @@ _BARE = '[robot]\nname = "x"\nbody = "y"\n'
             _BARE + "".join(f"[action.a{i}]\n" for i in range(65)),
             r"\[action\] must have at most 64 tables, not 65",
         ),
-        ('name = "rover', r"rover\.toml is not valid TOML: .* \(at .*\)\."),
-        ("x = " + "[" * 5000, r"rover\.toml is not valid TOML: "),
-        (f"x = {'9' * 5000}", r"rover\.toml is not valid TOML: .*digits"),
+        ("x = " + "[" * 5000, r"rover\.toml is not a profile: it is nested too deep"),
+        (f"x = {'9' * 5000}", r"rover\.toml is not a profile: it is nested too deep"),
     ],
-    ids=["empty", "bare", "output", "reset", "actions", "syntax", "nested", "digits"],
+    ids=["empty", "bare", "output", "reset", "actions", "nested", "digits"],
 )
 def test_texts_without_the_tables_are_refused(text: str, message: str) -> None:
     with pytest.raises(ProfileError, match=message):

@@ -74,10 +74,15 @@ class Frame:
     Attributes:
         jpeg: The image as JPEG.
         captured_ns: Time of capture on the robot's monotonic clock, ns.
+        encoded_here: Whether this process encoded the JPEG from an image of the right size. Such a
+            frame decodes, so it needs no further check.
+        skipped: Number of bytes between the previous frame and this one that belong to no frame.
     """
 
     jpeg: bytes
     captured_ns: int
+    encoded_here: bool = False
+    skipped: int = 0
 
 
 _Side = Annotated[int, Meta(ge=16, le=1920, multiple_of=2)]

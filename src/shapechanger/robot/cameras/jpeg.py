@@ -53,7 +53,7 @@ def encoded_frame(image: NDArray[np.uint8], captured_ns: int, plan: CameraPlan) 
     jpeg = simplejpeg.encode_jpeg(
         np.ascontiguousarray(image), plan.jpeg_quality, colorsubsampling="420"
     )
-    return Frame(jpeg, captured_ns)
+    return Frame(jpeg, captured_ns, encoded_here=True)
 
 
 def _require_size(width: int, height: int, plan: CameraPlan) -> None:
@@ -71,6 +71,7 @@ _NOT_IN_FRAME: Final = (0x00, _START[1])
 _WITHOUT_LENGTH: Final = frozenset({0x01, *range(0xD0, 0xD8)})
 # End of coded data: FF not followed by a stuffed zero, a restart marker or another FF.
 _AFTER_SCAN: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
+_ANOTHER: Final = re.compile(rb"\xff\xd8(?=\xff)")
 _CAPTURED: Final = re.compile(rb"captured_ns=([0-9]{1,20})")
 _COMMENT: Final = 0xFE
 # Lengths of segments (ITU-T T.81, B.2): a scan has at most four components; eight Huffman tables of
@@ -84,11 +85,14 @@ class JpegSplitter:
 
     A frame is parsed from marker to marker, so that a thumbnail in it, or a marker in a comment,
     does not end it. Bytes outside frames are skipped: the headers between the parts of an HTTP
-    stream, padding, a frame that is cut off. Frames that follow one that was cut off within a
-    segment may be lost, or not decode.
+    stream, padding, a frame that was cut off.
+
+    Attributes:
+        skipped: Number of bytes skipped so far.
     """
 
     def __init__(self) -> None:
+        self.skipped = 0
         self._data = bytearray()
         self._since_frame = 0  # Bytes skipped since the last frame.
 
@@ -104,10 +108,10 @@ class JpegSplitter:
                 it.
         """
         while (length := self._length_of_first()) is not None:
-            if length < 0:
-                self._skip(-length)
+            jpeg = bytes(self._data[: max(length, 0)])
+            if skipped := max(-length, 0) or _start_of_another(jpeg):
+                self._skip(skipped)
                 continue
-            jpeg = bytes(self._data[:length])
             del self._data[:length]
             self._since_frame = 0
             return jpeg
@@ -129,6 +133,7 @@ class JpegSplitter:
         return _length(self._data)
 
     def _skip(self, count: int) -> None:
+        self.skipped += count
         self._since_frame += count
         del self._data[:count]
 
@@ -161,6 +166,16 @@ def _length(data: bytes | bytearray) -> int | None:
             if data[at + 1] == _START[1]:
                 return -at  # The frame is cut off; the next one begins here.
     return None
+
+
+def _start_of_another(jpeg: bytes) -> int:
+    """Return where the complete frame begins that ends with these bytes; 0 for their start.
+
+    The length of a segment that is cut off may extend into the next frame, up to a marker there. A
+    thumbnail ends before its frame.
+    """
+    starts = (found.start() for found in _ANOTHER.finditer(jpeg, len(_START)))
+    return next((at for at in starts if _length(jpeg[at:]) == len(jpeg) - at), 0)
 
 
 def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:

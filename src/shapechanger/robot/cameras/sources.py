@@ -9,6 +9,7 @@ import stat
 import subprocess
 import time
 from contextlib import suppress
+from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
 from typing import Final
@@ -56,6 +57,7 @@ class Pipe(Camera):
 
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`. Bytes between frames are skipped."""
+        skipped = self._splitter.skipped
         while (jpeg := self._splitter.next()) is None:
             self._await_data()
         left = _MOST_WAITING
@@ -68,7 +70,8 @@ class Pipe(Camera):
             left -= len(waiting)
         captured_ns = captured_ns_of(jpeg)
         at_ns = time.monotonic_ns() if captured_ns is None else captured_ns
-        return checked_frame(jpeg, at_ns, self.plan)
+        frame = checked_frame(jpeg, at_ns, self.plan)
+        return replace(frame, skipped=self._splitter.skipped - skipped)
 
     def close(self) -> None:
         """Interrupt a waiting `read`, and end the program."""
@@ -105,10 +108,20 @@ class Pipe(Camera):
         return None
 
     def _await_data(self) -> None:
+        if self._fd < 0:
+            self._open()
         self.wait(self._fd)
-        if (data := self._waiting()) == b"":
+        data = self._waiting()
+        if data is None:
+            return  # Another reader of the pipe took the data.
+        if not data:
+            # The next read reopens the pipe and waits for its next writer.
+            self._splitter = JpegSplitter()
+            if self._program is None and self._live:
+                os.close(self._fd)
+                self._fd = -1
             raise RobotError(f"The stream of {self._path} has ended.")
-        self._splitter.feed(data or b"")  # Another reader of the pipe may have taken the data.
+        self._splitter.feed(data)
 
 
 class Folder(Camera):

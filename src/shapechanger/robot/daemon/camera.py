@@ -32,12 +32,13 @@ class FrameChecks:
 
     def refusal(self, frame: Frame) -> str:
         """Return the reason to reject a frame, or "" if it is valid and new."""
-        try:
-            # The driver has checked the header. Strict rejects missing data, which a decoder would
-            # otherwise fill with grey.
-            simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
-        except ValueError as error:
-            return f"The camera sent a JPEG that cannot be decoded: {error}."
+        if not frame.encoded_here:
+            try:
+                # The driver has checked the header. Strict rejects missing data, which a decoder
+                # would otherwise fill with grey.
+                simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
+            except ValueError as error:
+                return f"The camera sent a JPEG that cannot be decoded: {error}."
         # Sensor noise makes frames differ, so the same bytes are never a new frame.
         if frame.jpeg == self._last:
             return "The camera repeats the same frame."
@@ -65,6 +66,7 @@ class FrameReader:
         self._deliver = deliver
         self._report = report
         self._trouble = ""
+        self._skips = False
         self._end = threading.Event()
         self._camera: Camera | None = None
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
@@ -101,6 +103,12 @@ class FrameReader:
                         continue
                     good, bad = True, 0
                     self._deliver(frame)
+                    if frame.skipped and not self._skips:
+                        self._skips = True  # Some streams have bytes between all frames.
+                        self._report(
+                            f"The camera's stream has bytes between its frames that are no JPEG, "
+                            f"{frame.skipped} before this one: they are skipped."
+                        )
                     if self._trouble:
                         self._trouble = ""
                         self._report("The camera works again.")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Callable
+from array import array
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -39,6 +41,7 @@ class RecordingLibrary:
         self._folder = folder
         self._worker = Worker("library", call)
         self._known: dict[str, tuple[object, messages.EpisodeSummary]] = {}
+        self._index = LineIndex(Path())
 
     def ask(self, question: Question, then: Callable[[Answer], None]) -> None:
         """Queue a request; the caller limits the number of open requests."""
@@ -109,15 +112,15 @@ class RecordingLibrary:
     def _piece(self, path: Path, question: messages.Fetch) -> messages.Piece:
         """Read a part of an episode."""
         steps = path / STEPS
-        header = (path / HEADER).read_bytes().decode()
-        complete = steps.read_bytes().split(b"\n")[:-1]  # One more line may be in the writing.
-        asked = complete[question.first : question.first + question.count]
+        if self._index.path != steps:
+            self._index = LineIndex(steps)
+        index, header = self._index, (path / HEADER).read_bytes().decode()
         lines: list[str] = []
         frames: list[bytes | None] = []
         size, frame_before = len(header), ""
-        for number, line in enumerate(asked, question.first):
+        for number, line in enumerate(index.lines(question.first, question.count), question.first):
             try:
-                parsed = parse_line(line + b"\n")
+                parsed = parse_line(line.encode() + b"\n")
             except ValueError as error:
                 raise DemosError(
                     f"Line {number + 1} of {steps} is damaged, because {error}."
@@ -126,16 +129,16 @@ class RecordingLibrary:
             frame = None
             if name and name != frame_before:
                 frame = read_file(path / FRAMES / name, MAX_PICTURE_BYTES)
-            size += len(line) + len(frame or b"")
+            size += len(line.encode()) + len(frame or b"")
             if lines and size > messages.MAX_PIECE:
                 break
-            lines.append(line.decode())
+            lines.append(line)
             frames.append(frame)
             frame_before = name
         piece = messages.Piece(
             episode=question.episode,
             first=question.first,
-            total=len(complete),
+            total=len(index),
             lines=tuple(lines),
             frames=tuple(frames),
             header=header,
@@ -143,6 +146,36 @@ class RecordingLibrary:
         if size > messages.MAX_PIECE and len(messages.encode(piece)) > messages.MAX_ROBOT_MESSAGE:
             raise DemosError(f"Line {question.first + 1} of {steps} is too large to send.")
         return piece
+
+
+class LineIndex:
+    r"""Offsets of the complete lines of a growing file: those that end with `\n`."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._ends: array[int] = array("Q", [0])  # 0, and the offset behind each complete line.
+        self._inode = -1
+
+    def __len__(self) -> int:
+        """Return the number of complete lines when they were read last."""
+        return len(self._ends) - 1
+
+    def lines(self, first: int, count: int) -> Iterator[str]:
+        r"""Read up to `count` lines from number `first` on, and return them without their `\n`.
+
+        Lines that were appended are indexed first, or all lines if the file was replaced.
+        """
+        with self.path.open("rb") as file:
+            found = os.fstat(file.fileno())
+            if found.st_ino != self._inode or found.st_size < self._ends[-1]:
+                self._ends, self._inode = array("Q", [0]), found.st_ino
+            file.seek(self._ends[-1])
+            for line in file:
+                if line.endswith(b"\n"):
+                    self._ends.append(self._ends[-1] + len(line))
+            file.seek(self._ends[min(first, len(self))])
+            for _ in range(first, min(first + count, len(self))):
+                yield file.readline()[:-1].decode()
 
 
 def _is_listed(path: Path) -> bool:

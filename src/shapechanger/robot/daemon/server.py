@@ -187,6 +187,7 @@ class AcceptedSocket:
 
 
 _SHUTDOWN_S: Final = 0.2  # Short, because no messages remain to be sent.
+_GUARD_SILENT_NS: Final = 1_000_000_000
 _CONSOLE: Final = "/console/"
 
 _HEADERS: Final = {
@@ -255,6 +256,7 @@ class Server:
         for name, file in files.items():
             app.router.add_get(f"{_CONSOLE}{name}", partial(_serve_file, *file))
         app.router.add_get(f"{_CONSOLE}robot.json", self._robot)
+        app.router.add_get("/healthz", self._health)
         app.router.add_get("/link", self._link)
         return app
 
@@ -285,6 +287,14 @@ class Server:
                 "open": self._authenticator.is_open,
             }
         )
+
+    async def _health(self, _: web.Request) -> web.Response:
+        at_ns = self._hub.state.at_ns
+        heard = at_ns and self._hub.now_ns() - at_ns <= _GUARD_SILENT_NS
+        # A twin's time stands still while no client drives, and its guard is silent then.
+        if heard or self._hub.in_steps:
+            return web.json_response({"guard": "well"})
+        return web.json_response({"guard": "silent"}, status=503)
 
     async def _link(self, request: web.Request) -> web.StreamResponse:
         refusal = origin_refusal(

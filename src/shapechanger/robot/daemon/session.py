@@ -74,7 +74,13 @@ class Session:
         client: Identity of the client, and the messages for it other than observations.
     """
 
-    def __init__(self, number: int, hub: SessionHub, authenticator: Authenticator) -> None:
+    def __init__(
+        self,
+        number: int,
+        hub: SessionHub,
+        authenticator: Authenticator,
+        messages_per_s: float = MESSAGES_PER_S,
+    ) -> None:
         self.client = Client(number)
         self._hub = hub
         self._authenticator = authenticator
@@ -89,7 +95,7 @@ class Session:
         self._frame_seq = 0
         self._awaits_library = False
         # A token bucket that holds one second's worth of messages.
-        self._tokens = MESSAGES_PER_S
+        self._messages_per_s = self._tokens = messages_per_s
         self._counted_s = monotonic()
         # Uncompressed, and without a send queue.
         self._socket = web.WebSocketResponse(
@@ -209,15 +215,15 @@ class Session:
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
         if self._pace == "lockstep":  # The robot sets the pace, at any rate.
-            self._tokens = min(MESSAGES_PER_S, self._tokens + 1.0)
+            self._tokens = min(self._messages_per_s, self._tokens + 1.0)
         self._credit = False
         return observation
 
     def _count(self) -> None:
         """Count a message, and refuse it above the rate."""
         now_s = monotonic()
-        gained = (now_s - self._counted_s) * MESSAGES_PER_S
-        self._tokens = min(MESSAGES_PER_S, self._tokens + gained)
+        gained = (now_s - self._counted_s) * self._messages_per_s
+        self._tokens = min(self._messages_per_s, self._tokens + gained)
         self._counted_s = now_s
         if self._tokens < 1.0:
             raise RobotRefused(f"Too many messages: {MESSAGES_PER_S:.0f} per second are allowed.")

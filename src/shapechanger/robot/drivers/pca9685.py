@@ -97,6 +97,8 @@ class Pca9685(I2cDevice):
 
     def __init__(self, keys: Pca9685Keys, hz: int, hardware: Hardware) -> None:
         super().__init__("The PCA9685", keys, hardware)
+        self.hz = hz
+        self.output_enable = keys.output_enable
         self.steps: dict[int, int | None] = {}
         self._clock = hardware.clock
         self._prescale = round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1  # Section 7.3.5.
@@ -193,7 +195,8 @@ _OPEN: Final = WeakValueDictionary[tuple[Hardware, int, int], Pca9685]()
 class Pca9685Channel(PulseChannel):
     """One channel, opened without pulses.
 
-    A profile gives each channel to one output, and the channels of a chip one frequency and pin.
+    RobotError is raised if the chip does not respond, the channel is used twice, or another channel
+    of the chip has another frequency or enable pin.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
@@ -202,6 +205,13 @@ class Pca9685Channel(PulseChannel):
         chip = _OPEN.get(place)
         if chip is None or not chip.steps:
             chip = _OPEN[place] = Pca9685(keys, hz, hardware)
+        if (chip.hz, chip.output_enable) != (hz, keys.output_enable):
+            raise RobotError(
+                f"{chip.name} has one frequency and one output_enable for all of its channels, not "
+                f"{chip.hz} and {hz} Hz, GPIO{chip.output_enable} and GPIO{keys.output_enable}."
+            )
+        if keys.channel in chip.steps:
+            raise RobotError(f"Channel {keys.channel} of {chip.name} is used twice.")
         self._chip, self._channel = chip, keys.channel
         with ExitStack() as undo:
             undo.callback(chip.leave, keys.channel)  # A retry finds the channel free.

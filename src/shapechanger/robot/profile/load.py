@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from shapechanger.robot.profile.read import read_profile
 _SHIPPED: Final = Path(__file__).parent / "shipped"
 _SUFFIX: Final = ".toml"
 _LARGEST: Final = 1024 * 1024  # Size of the largest profile, bytes.
+_MOST_LISTED: Final = 40
 
 CAMERAS: Final = {"ribbon": "picamera2", "usb": "v4l2", "none": ""}
 """Driver of each kind of camera that a new profile can have."""
@@ -41,10 +43,11 @@ def find_profile(name_or_path: str | os.PathLike[str]) -> Path:
         return path
     shipped = shipped_profiles()
     if text not in shipped:
-        if (own := Path(f"{text}{_SUFFIX}")).is_file():
-            return own
-        here = (file.stem for file in Path().glob(f"*{_SUFFIX}") if file.is_file())
-        raise UnknownName("profile", text, [*shipped, *here])
+        here = Path(f"{text}{_SUFFIX}")
+        if here.is_file():
+            return here
+        stems = [file.stem for file in Path().glob(f"*{_SUFFIX}") if file.is_file()]
+        raise UnknownName("profile", text, [*shipped, *difflib.get_close_matches(text, stems)])
     return shipped[text]
 
 
@@ -71,14 +74,25 @@ def profile_text(path: str | os.PathLike[str]) -> str:
         # mark.
         text = data.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError as error:
-        known = [*shipped_profiles(), *(file.stem for file in path.parent.glob(f"*{_SUFFIX}"))]
-        missing = UnknownName("profile", path.stem, known)
-        raise ProfileError(f"There is no file {path}. {missing}") from error
-    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or NUL in the path.
-        raise ProfileError(f"{path} cannot be read: {error}.") from error
+        raise ProfileError(f"There is no file {path}{_instead_of(path)}.") from error
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise ProfileError(f"{path}, line {line}: this is not UTF-8 text.") from error
+    except (OSError, ValueError) as error:  # ValueError: NUL in the path.
+        message = getattr(error, "strerror", None) or error
+        raise ProfileError(f"{path} cannot be read: {message}.") from error
     if len(data) > _LARGEST:
         raise ProfileError(f"{path} is longer than a profile can be, 1 MiB.")
     return text
+
+
+def _instead_of(path: Path) -> str:
+    """Return the end of a sentence about a missing profile: the nearest one, and all of them."""
+    known = dict.fromkeys(shipped_profiles(), " of Shapechanger")
+    known |= {file.stem: f" in {path.parent}" for file in sorted(path.parent.glob(f"*{_SUFFIX}"))}
+    close = difflib.get_close_matches(path.stem, known, n=1)
+    near = f" (did you mean {close[0]}{known[close[0]]}?)" if close else ""
+    return f"{near}; there are: {', '.join([*known][:_MOST_LISTED])}"
 
 
 def starter_text(
@@ -153,7 +167,7 @@ def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile
 
     Raises:
         ProfileError: If the file is not a valid profile, before or after the change.
-        KeyError: If a table is not in the file.
+        UnknownName: If a table is not in the file.
         OutputError: If the file cannot be written; it is then unchanged.
     """
     import tomlkit  # Nothing that drives a robot needs it.
@@ -166,6 +180,9 @@ def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile
         *tables, key = dotted.split(".")
         table: Any = document
         for name in tables:
+            known = [k for k, v in table.items() if isinstance(v, dict)]
+            if name not in known:
+                raise UnknownName(f"table of {target.name}", name, known)
             table = table[name]
         if isinstance(value, dict):
             entries: Any = tomlkit.inline_table()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -12,7 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from shapechanger.contract.plan import ActionPlan, LimitPlan, OutputPlan, SensorPlan, StopPlan
-from shapechanger.errors import ProfileError, translate_errors
+from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CAMERAS, CameraPlan
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS, Keys
 from shapechanger.robot.drivers.pins import Pin
@@ -20,6 +21,8 @@ from shapechanger.robot.drivers.servos.settings import ServoBusKeys
 from shapechanger.robot.profile.profile import CommandTable, Profile, ResetStep, RobotTable
 from shapechanger.robot.profile.rules import RULES
 from shapechanger.robot.profile.toml import Table, choice, fields_of
+
+_AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
 
 
 class RewardKeys(Keys, frozen=True, kw_only=True):
@@ -114,12 +117,7 @@ def read_profile(text: str, path: Path) -> Profile:
         ProfileError: If the text is not TOML or not a valid profile; names the file and the line.
     """
     text = text.replace("\r\n", "\n")
-    with translate_errors(
-        ValueError,  # Among them integers with thousands of digits, which Python refuses.
-        RecursionError,
-        to=lambda error: ProfileError(f"{path} is not valid TOML: {error}."),
-    ):
-        root = Table(path, text, (), tomllib.loads(text))
+    root = Table(path, text, (), _toml(text, path))
     for name in root.keys:
         if name not in TABLES:
             raise root.error(f"a profile has no table or key {choice(name, TABLES)}", name)
@@ -161,6 +159,20 @@ def read_profile(text: str, path: Path) -> Profile:
     return profile
 
 
+def _toml(text: str, path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        at = _AT.fullmatch(str(error))
+        line = int(at[2]) if at else text.count("\n") + 1
+        message = f"{at[1]} at column {at[3]}" if at else str(error)
+        message = f"this is not valid TOML: {message[:1].lower()}{message[1:]}"
+        raise ProfileError(f"{path}, line {line}: {message}.") from None
+    except (RecursionError, ValueError):  # Python refuses integers with thousands of digits.
+        message = "it is nested too deeply, or a number has too many digits"
+        raise ProfileError(f"{path} is not a profile: {message}.") from None
+
+
 def _read_action(table: Table) -> ActionPlan:
     (action,) = table.decode(ActionPlan, given={"name": table.place[-1]})
     if "low" not in table.keys and action.one_sided:
@@ -186,12 +198,13 @@ def _read_sensor(table: Table) -> SensorPlan:
 
 def _read_part(table: Table, plan: type, **given: Any) -> Any:
     """Return a plan with the settings of its driver, and of the pulses if the driver takes any."""
+    drivers = DRIVERS[str(table.place[0])]
     kinds: list[type[Keys]] = []
-    for key, chips in DRIVERS[str(table.place[0])].items():
+    for key, chips in drivers.items():
         if not kinds or key in fields_of(kinds[0]):
             kinds.append(chips[table.chosen(key, chips)].keys)
     given["settings"] = {}
-    part, *parts = table.decode(plan, *kinds, given=given)
+    part, *parts = table.decode(plan, *kinds, given=given, drivers=drivers)
     settings = {key: value for keys in parts for key, value in keys.settings().items()}
     return replace(part, settings=settings)
 

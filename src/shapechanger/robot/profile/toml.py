@@ -59,11 +59,14 @@ def line_of(text: str, place: Place) -> int:
 def choice(name: str, known: Iterable[str]) -> str:
     """Describe an unknown name: the nearest spelling and the known names."""
     names = sorted(known)
+    return f"{name!r}{_nearest(name, names)}; there are: {', '.join(names) or 'none'}"
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
     # A key without its unit, such as `slew` for `slew_per_s`, may not be close.
-    with_unit = sorted((one for one in names if one.startswith(f"{name}_")), key=len)
-    close = [*with_unit, *difflib.get_close_matches(name, names, n=1)]
-    hint = f" (did you mean {close[0]!r}?)" if close else ""
-    return f"{name!r}{hint}; there are: {', '.join(names) or 'none'}"
+    with_unit = sorted((one for one in known if one.startswith(f"{name}_")), key=len)
+    close = [*with_unit, *difflib.get_close_matches(name, known, n=1)]
+    return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def shown(value: Any) -> str:
@@ -188,16 +191,28 @@ class Table:
             raise self._unfit(key, kind)
         return self.keys[key]
 
-    def decode(self, *kinds: type, given: Mapping[str, Any] | None = None) -> list[Any]:
+    def decode(
+        self,
+        *kinds: type,
+        given: Mapping[str, Any] | None = None,
+        drivers: Mapping[str, Mapping[str, Any]] | None = None,
+    ) -> list[Any]:
         """Return one value of each type, whose fields together are the keys of the table.
 
         Args:
             kinds: Structs and dataclasses.
             given: Fields that are not keys of the table.
+            drivers: Chips that a key of the table chooses from, keyed by this key: an unknown key
+                may belong to another one.
         """
         given = given or {}
         known = {n: one for kind in kinds for n, one in fields_of(kind).items() if n not in given}
         for name in (one for one in self.keys if one not in known):
+            for key, chips in (drivers or {}).items():
+                having = [repr(one) for one in chips if name in fields_of(chips[one].keys)]
+                if having:
+                    text = f"{name!r} belongs to {key} = {' or '.join(having)}, not to {self}"
+                    raise self.error(text, name)
             raise self.error(f"{self} has no key {choice(name, known)}", name)
         for name, one in known.items():
             if one.required and name not in self.keys:
@@ -219,5 +234,8 @@ class Table:
         """Return an error about a key that is missing, or whose type does not permit its value."""
         if key not in self.keys:
             return self.refused("", f"lacks the key {key!r}, {permitted(kind)}")
-        why = why or f"not {shown(self.keys[key])}"
+        value = self.keys[key]
+        why = why or f"not {shown(value)}"
+        if isinstance(kind, inspect.LiteralType) and isinstance(value, str):
+            why += _nearest(value, [*map(str, kind.values)])
         return self.refused(key, f"must be {permitted(kind)}, {why}")

@@ -58,7 +58,7 @@ def test_setup_configures_servos_without_torque(family: str, expected: str) -> N
     ("family", "register", "data", "text"),
     [
         ("Feetech", 16, b"\7\7", r"EDC \(id 4\) does not keep 157 as maximum torque"),
-        ("Dynamixel", 98, b"\xff", r"EDC \(id 4\) refuses to set its bus watchdog to 0: error"),
+        ("Dynamixel", 98, b"\xff", r"EDC \(id 4\) refuses to set its bus watchdog to 0: the"),
     ],
 )
 def test_a_setting_that_is_not_kept_is_an_error(

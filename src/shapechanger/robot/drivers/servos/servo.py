@@ -44,6 +44,15 @@ class ServoPort(Protocol):
 
 # A single lost packet must not keep a rig from starting. Cycles never retry.
 _TRIES: Final = 3
+_REFUSALS: Final = {
+    1: "it could not do it",
+    2: "it does not know the instruction",
+    3: "the packet was damaged on its way",
+    4: "the value is out of range",
+    5: "the value has the wrong length",
+    6: "the value is beyond a limit",
+    7: "the register cannot be written now",
+}
 # Counts ahead of its position at which to set the goal of a servo that pulls in position mode.
 _AHEAD: Final = 1024
 # Missed cycles in a row that make a fault.
@@ -180,7 +189,8 @@ class TendonServo:
         for _ in range(_TRIES):
             if reply := ask().get(self.settings.id):
                 if number := reply.error & self._family.refused:
-                    raise RobotError(f"{self.settings.label} refuses to {doing}: error {number}.")
+                    why = _REFUSALS.get(number, f"it gives the unknown reason {number}")
+                    raise RobotError(f"{self.settings.label} refuses to {doing}: {why}.")
                 return reply.data
         return None
 
