@@ -73,10 +73,26 @@ def test_deletions_go_by_index(
     assert "left out" not in findings_of(done)
 
 
-def test_a_tub_of_version_1_is_converted_by_donkeycar(tmp_path: Path) -> None:
-    (tmp_path / "record_3.json").write_text("{}")
-    with pytest.raises(DemosError, match="of version 1: Donkeycar's convert_to_tub_v2 converts it"):
-        import_recording(tmp_path, tmp_path.with_name("data"))
+def test_a_tub_of_version_1(tmp_path: Path) -> None:
+    """Deletions go by the numbers of the records, and a restart of the car begins an episode."""
+    folder = tmp_path / "tub"
+    folder.mkdir()
+    for n in range(3, 15):
+        (folder / f"{n}_cam.jpg").write_bytes(picture(n))
+        fields = {"cam/image_array": f"{n}_cam.jpg", "user/angle": n / 100, "user/throttle": 0.5}
+        fields["milliseconds"] = 50 * (n - 3 if n < 13 else n - 13)
+        (folder / f"record_{n}.json").write_text(json.dumps(fields))
+    (folder / "meta.json").write_text(json.dumps({"inputs": [], "types": []}))
+    (folder / "exclude.json").write_text("[5, 6, 40]")
+    episodes, done = imported(folder)
+    assert episodes == [[3, 4, *range(7, 13)], [13, 14]]
+    assert "Records that are deleted in the tub are not imported: 2." in findings_of(done)
+    first, _ = all_of(next(path for path in tmp_path.iterdir() if path != folder))
+    assert first.header.control_hz == pytest.approx(20.0)
+    assert {step.wall_ns for step in first.steps} == {None}  # Times are relative to the start.
+    (folder / "exclude.json").write_text('{"5": true}')
+    with pytest.raises(DemosError, match=r"exclude.json is damaged: Expected `array`"):
+        imported(folder)
 
 
 def lines(change: Callable[[list[bytes]], list[bytes]]) -> Callable[[Path], object]:

@@ -1,16 +1,17 @@
-"""Donkeycar tubs of version 2.
+"""Donkeycar tubs: import of versions 1 and 2, export of version 2.
 
 `user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, as in
 Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is the action of a policy.
 In the other modes `pilot/...` drives, except for the person's throttle in "local_angle".
 
-A tub is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more metadata,
-and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted indexes
-are values of the records' `_index`; `_timestamp_ms` is Unix time, and `_session_id` names the start
-of the car.
+Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
+metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted
+indexes are values of the records' `_index`; `_timestamp_ms` is Unix time, and `_session_id` names
+the start of the car. Version 1 has a file `record_N.json` per record, its image next to it,
+optionally `milliseconds` since the start, `meta.json`, and the deleted numbers in `exclude.json`.
 
-Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py at the commits
-1e831b81, 38a1c2db and b253cef6.
+Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py for version 2,
+parts/datastore.py for version 1, at the commits 1e831b81, 38a1c2db and b253cef6.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from shapechanger.layout import Layout
 _MANIFEST: Final = "manifest.json"
 _IMAGES: Final = "images"
 _LOOP_HZ: Final = "DRIVE_LOOP_HZ"  # Donkeycar's name of the rate.
+_RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 _IMAGE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
 _ACTIONS: Final = Layout((base.COMMANDS["steering"], base.COMMANDS["throttle"]))
 _USER, _PILOT = ([f"{who}/{axis}" for axis in ("angle", "throttle")] for who in ("user", "pilot"))
@@ -75,8 +77,64 @@ class _Catalogs(Struct):
     current_index: int = 0
 
 
-def _is_tub(folder: Path) -> bool:
-    return (folder / _MANIFEST).is_file() or any(folder.glob("record_*.json"))
+class _Tub(Struct):
+    """A tub; the first four fields are in the `meta.json` of version 1."""
+
+    inputs: list[str] = []
+    types: list[str] = []
+    start: float | None = None  # Unix time, s.
+    rate: Any = field(default=None, name=_LOOP_HZ)
+    records: dict[int, Fields] = {}
+    deleted: list[int] = []
+    is_unix: bool = True  # Otherwise times begin at 0 with each start of the car.
+
+
+def _numbered(folder: Path) -> list[tuple[int, str]]:
+    """Return the numbers and files of the records of version 1."""
+    names = (path.name for path in folder.glob("record_*.json"))
+    return sorted((int(m[1]), m[0]) for m in map(_RECORD_NAME.fullmatch, names) if m)
+
+
+def _read_v1(folder: Path, context: base.ImportContext) -> _Tub:
+    """Read a file for each record; without Unix times, each start of the car is a session."""
+    path, exclude = folder / "meta.json", folder / "exclude.json"
+    tub = files.read_json(path, _Tub) if path.is_file() else _Tub()
+    tub.deleted = files.read_json(exclude, list[int]) if exclude.is_file() else []
+    tub.records, tub.is_unix = {}, tub.start is not None
+    starts, before_ms = 1, 0.0
+    for number, name in _numbered(folder):
+        text = files.read_bytes(files.inside(folder, name, folder))
+        try:
+            fields: Fields = files.parse_json(text, name, Fields)
+        except DemosError:
+            if number not in tub.deleted:
+                context.report("left out", "damaged JSON", f"record {number}")
+            continue
+        time_ms = fields.pop("milliseconds", None)
+        if type(time_ms) in {int, float} and abs(time_ms) < _MAX_MS:
+            starts, before_ms = starts + (time_ms < before_ms), time_ms
+            time_ms += 1e3 * (tub.start or 0.0)
+        session = "" if tub.is_unix else f"start {starts}"
+        tub.records[number] = fields | {"_timestamp_ms": time_ms, "_session_id": session}
+    return tub
+
+
+def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
+    path = folder / _MANIFEST
+    lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
+    kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
+    inputs, types, metadata, _, catalogs = (
+        files.parse_json(line, path, kind) for line, kind in zip(lines, kinds, strict=True)
+    )
+    if len(set(catalogs.paths)) < len(catalogs.paths):
+        raise DemosError(f"{path} names a catalog twice in its paths.")
+    return _Tub(
+        inputs=inputs,
+        types=types,
+        rate=dict(metadata).get(_LOOP_HZ),
+        records=_catalogued(folder, catalogs, context),
+        deleted=catalogs.deleted_indexes,
+    )
 
 
 def _catalogued(
@@ -116,20 +174,15 @@ def _catalogued(
 
 def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEpisode]:
     """Yield the episodes of a tub: its sessions, divided at pauses and where time jumps."""
-    path = folder / _MANIFEST
-    if not path.is_file():
-        raise DemosError(f"{folder} is of version 1: Donkeycar's convert_to_tub_v2 converts it.")
-    lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
-    kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
-    inputs, kinds_of_inputs, metadata, _, catalogs = (
-        files.parse_json(line, path, kind) for line, kind in zip(lines, kinds, strict=True)
+    is_v2 = (folder / _MANIFEST).is_file()
+    tub = (_read_v2 if is_v2 else _read_v1)(folder, context)
+    if len(tub.inputs) != len(tub.types):
+        raise DemosError(f"{folder} has {len(tub.inputs)} inputs, but {len(tub.types)} types.")
+    types, deleted, found = (
+        dict(zip(tub.inputs, tub.types, strict=True)),
+        {*tub.deleted},
+        tub.records,
     )
-    if len(inputs) != len(kinds_of_inputs):
-        raise DemosError(f"{path} has {len(inputs)} inputs, but {len(kinds_of_inputs)} types.")
-    if len(set(catalogs.paths)) < len(catalogs.paths):
-        raise DemosError(f"{path} names a catalog twice in its paths.")
-    types, deleted = dict(zip(inputs, kinds_of_inputs, strict=True)), {*catalogs.deleted_indexes}
-    found = _catalogued(folder, catalogs, context)
     kept = {number: fields for number, fields in found.items() if number not in deleted}
     if gone := len(found) - len(kept):
         context.report("note", f"Records that are deleted in the tub are not imported: {gone}.")
@@ -147,7 +200,8 @@ def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEp
         context.report("note", f"Columns that are not imported: {', '.join(left)}.")
     records = [_record(number, fields, sensed) for number, fields in kept.items()]
     if camera:
-        _find_images(records, [one.get(camera) for one in kept.values()], folder, context)
+        images = folder / _IMAGES if is_v2 else folder
+        _find_images(records, [one.get(camera) for one in kept.values()], images, context)
     sessions = {number: str(fields.get("_session_id", "")) for number, fields in kept.items()}
     parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
     header = EpisodeHeader(
@@ -158,10 +212,10 @@ def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEp
         body="car",
         source="tub",
     )
-    rate = _float(dict(metadata).get(_LOOP_HZ))
+    rate = _float(tub.rate)
     stated_hz = rate if 0.0 < rate < math.inf else None
     for part, head in base.drives(parts, header, context, stated_hz):
-        if head.clock == "real":
+        if head.clock == "real" and tub.is_unix:
             for record in part:
                 record.step = structs.replace(record.step, wall_ns=record.step.captured_ns)
             at = datetime.fromtimestamp((part[0].step.wall_ns or 0) / _NS_PER_S, UTC)
@@ -205,10 +259,9 @@ def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.Exchange
 
 
 def _find_images(
-    records: list[base.ExchangeRecord], names: list[Any], folder: Path, context: base.ImportContext
+    records: list[base.ExchangeRecord], names: list[Any], images: Path, context: base.ImportContext
 ) -> None:
     """Find the image of each record by its name; the others get a fault."""
-    images = folder / _IMAGES
     shown = Counter(str(name) for name, one in zip(names, records, strict=True) if not one.fault)
     for record, name in zip(records, names, strict=True):
         if record.fault:
@@ -216,7 +269,7 @@ def _find_images(
         if not name or not isinstance(name, str):
             record.fault = "no image"
             continue
-        # The type "image" may have the whole path on the robot.
+        # Version 1 writes whole paths of the robot for the type "image".
         place = PurePath(name).name if PurePath(name).is_absolute() else name
         record.frame, record.image = name, images / place
         if not files.is_inside(images, place):
@@ -319,8 +372,8 @@ def _began(header: EpisodeHeader) -> datetime:
 FORMAT: Final = base.Format(
     name="tub",
     title="Donkeycar",
-    sign=_MANIFEST,
-    detect=_is_tub,
+    sign=f"{_MANIFEST} or record_0.json",
+    detect=lambda folder: (folder / _MANIFEST).is_file() or bool(_numbered(folder)),
     read=_read,
     write=_write,
     options=frozenset({"camera", "hz"}),
