@@ -206,7 +206,7 @@ def test_pictures_of_other_records(tmp_path: Path) -> None:
     for n in range(8):
         (folder / f"images/{n}_cam_image_array_.jpg").write_bytes(picture(n))
     _, done = imported(folder)
-    assert "and 3 more: the image of another number" in findings_of(done)
+    assert "... (6 in all): the image of another number" in findings_of(done)
 
 
 @pytest.mark.parametrize("lines", [0, 4])

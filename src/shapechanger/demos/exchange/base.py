@@ -229,9 +229,9 @@ class Format:
 
 
 def few(names: Sequence[object]) -> str:
-    """List the first few names and count the rest, such as "12, 15, 20, and 286 more"."""
+    """List the first few names and count all, such as "12, 15, 20, ... (289 in all)"."""
     shown = ", ".join(map(str, names[:3]))
-    return f"{shown}, and {len(names) - 3} more" if len(names) > 3 else shown
+    return f"{shown}, ... ({len(names)} in all)" if len(names) > 3 else shown
 
 
 def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[ExchangeRecord]:
