@@ -89,7 +89,7 @@ FALSE = b"false,false"
         (
             False,
             _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"),
-            "line 3 of keys: it is not a valid step",
+            "line 3 of keys: it is invalid",
         ),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,nan,0.0,1.0"), "line 3 of keys: its action is"),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,,1.0"), "its action has 3 values"),

@@ -66,7 +66,7 @@ def test_a_table_of_others_with_states(tmp_path: Path) -> None:
     done = import_recording(tmp_path / "table", tmp_path / "data", hz=20.0)
     text = findings_of(done)
     assert "note: Columns that are not imported: lap." in text
-    assert "line 4 of table, line 5 of table: it is not a valid step (Expected `float`" in text
+    assert "line 4 of table, line 5 of table: it is invalid (Expected `float`" in text
     (episode,) = all_of(tmp_path / "data")
     assert Layout.from_json(episode.header.action_layout).names == ("steering", "throttle")
     assert [step.action for step in episode.steps] == [(0.5, 1.0), (-1.0, 0.0)]
