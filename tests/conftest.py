@@ -36,7 +36,12 @@ settings.load_profile("shapechanger")
 COVERING = tuple(
     f"tests/{path}"
     for path in (
-        *("test_architecture.py", "test_errors.py", "test_layout.py", "contract/test_drive.py"),
+        *(
+            "test_architecture.py",
+            "test_errors.py",
+            "test_layout.py",
+            "contract/test_drive_reward.py",
+        ),
         *("envs/stepping/", "envs/vector/", "envs/test_own_tasks.py", "laws/", "morphology/"),
         *("finger/identify/", "finger/test_paths.py", "finger/test_task.py"),
         *("robot/guard/", "robot/link/", "robot/profile/"),

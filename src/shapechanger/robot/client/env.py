@@ -13,7 +13,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.drive import DriveReward
+from shapechanger.contract.drive_reward import DriveReward
 from shapechanger.errors import LinkError, RenderError, RobotRefused, StaleObservation, UnknownName
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.connection import Received

@@ -18,7 +18,7 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.contract.drive import DriveReward
+from shapechanger.contract.drive_reward import DriveReward
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import (
     ProfileError,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.contract.drive import DriveReward
+from shapechanger.contract.drive_reward import DriveReward
 from shapechanger.contract.limits import Duty
 from shapechanger.errors import UnknownName
 
