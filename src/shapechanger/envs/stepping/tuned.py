@@ -7,7 +7,6 @@ import hashlib
 import sys
 import threading
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from operator import attrgetter
@@ -35,7 +34,7 @@ Outcomes = tuple[NDArray[np.float64], NDArray[Any], NDArray[np.bool_], dict[str,
 
 
 class PausedClock:
-    """Context in which MuJoCo's profiling clock is paused, for all threads.
+    """Steps the physics while MuJoCo's profiling clock is paused, for all threads.
 
     A step of an ant reads the clock hundreds of times to fill `data.timer`, on which no other
     number depends. `mujoco.set_mjcb_time(None)` installs the clock again, so its pointer is set. A
@@ -51,29 +50,32 @@ class PausedClock:
         self._inside = 0
         self._lock = threading.Lock()
 
-    def __enter__(self) -> None:
+    def step(self, model: mujoco.MjModel, data: mujoco.MjData, frame_skip: int) -> None:
+        """Step the physics, as `Binding.move` does."""
         with self._lock:
             self._inside += 1
             if self._clock.value == self._usual:
                 self._clock.value = None
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._inside -= 1
-            if not self._inside and self._clock.value is None:
-                self._clock.value = self._usual
+        try:
+            mujoco.mj_step(model, data, frame_skip)
+            mujoco.mj_rnePostConstraint(model, data)
+        finally:
+            with self._lock:
+                self._inside -= 1
+                if not self._inside and self._clock.value is None:
+                    self._clock.value = self._usual
 
 
 @cache
-def paused_clock() -> AbstractContextManager[None]:
-    """Return the context that pauses the clock; it does nothing if a user has installed one."""
+def paused_clock() -> PausedClock | None:
+    """Return the clock that can be paused; None if a user has installed one."""
     if mujoco.get_mjcb_time() is not None:
-        return nullcontext()
+        return None
     try:
         bindings = ctypes.CDLL(cast("Any", mujoco)._callbacks.__file__)
         return PausedClock(ctypes.c_void_p.in_dll(bindings, "mjcb_time"))
     except (AttributeError, OSError, ValueError):  # pragma: no cover  # Another MuJoCo build.
-        return nullcontext()
+        return None
 
 
 # Arrays closer than this in memory, bytes, are compared together with the bytes between them.
@@ -178,7 +180,7 @@ class Binding:
         self.ctrl, self.qpos, self.qvel = data.ctrl, data.qpos, data.qvel
         self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[BAD_STATE]
         self.kind: str | None = None
-        self._clock = paused_clock() if env.fast_model else nullcontext()
+        self._clock = paused_clock() if env.fast_model else None
         if env.fast_model and watch.shared.fast is not None:
             self.step_with(watch.shared.fast)
 
@@ -189,9 +191,11 @@ class Binding:
 
     def move(self) -> None:
         """Step the physics."""
-        with self._clock:
-            mujoco.mj_step(self.stepping, self.data, self.frame_skip)
-            mujoco.mj_rnePostConstraint(self.stepping, self.data)
+        if self._clock is not None:
+            self._clock.step(self.stepping, self.data, self.frame_skip)
+            return
+        mujoco.mj_step(self.stepping, self.data, self.frame_skip)
+        mujoco.mj_rnePostConstraint(self.stepping, self.data)
 
 
 class TunedStep(Reshapable):
