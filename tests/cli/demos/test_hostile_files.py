@@ -219,13 +219,13 @@ TUBS: Spoilt = {
     ),
     "an image of 60000 x 60000 pixels": (
         lambda f: (f / "images/1_cam_image_array_.jpg").write_bytes(huge()),
-        "1 record with a damaged image",
+        "record 1: a damaged image",
     ),
     "a catalog of 8 GiB": (lambda f: sparse(f / "catalog_0.catalog", 8 * GIB), "the limit"),
     "a catalog that is a pipe": (lambda f: pipe(f / "catalog_0.catalog"), "There is no"),
     "a catalog nested deeply": (
         lambda f: (f / "catalog_0.catalog").write_text("[" * 100_000),
-        "with damaged JSON",
+        "damaged JSON",
     ),
 }
 
@@ -325,7 +325,7 @@ def stored(place: str, spoil: Callable[[h5py.File, str], object]) -> Callable[[P
 def space_of_others(folder: Path) -> None:
     """Claim a space of 10^9 numbers in a dataset that is not ours, which Minari would fill."""
     path = folder / "data/metadata.json"
-    known = {"total_episodes", "data_format", "dataset_id"}
+    known = {"total_episodes", "data_format", "dataset_id", "action_space"}
     fields = {key: value for key, value in json.loads(path.read_text()).items() if key in known}
     space = {"type": "Box", "dtype": "float32", "shape": [10**9], "low": -1.0, "high": 1.0}
     path.write_text(json.dumps(fields | {"observation_space": json.dumps(space)}))
@@ -343,7 +343,7 @@ DATASETS: Spoilt = {
                 at, (1 << 27,), "f8", chunks=(1 << 27,), compression="gzip"
             ),
         ),
-        "more than the limit",
+        "bytes: too many",
     ),
     "10^12 steps": (stored(REWARDS, endless), "claims at least"),
     "10^12 values in a step": (
@@ -351,7 +351,7 @@ DATASETS: Spoilt = {
             ACTIONS,
             lambda f, at: f.create_dataset(at, (5, 1 << 40), "f8", chunks=(1, 1 << 10)),
         ),
-        "more than the limit",
+        "bytes: too many",
     ),
     "a space of 10^9 values": (space_of_others, "claims more than"),
 }

@@ -164,13 +164,17 @@ class RangesEnv(DriveEnv):
     v1: the first.
 
     Args:
-        vehicle, world, robot, randomise, render_mode: As of `VehicleEnv`, with its errors.
+        vehicle: As in `VehicleEnv`, with its errors.
+        world: As in `VehicleEnv`.
+        robot: As in `VehicleEnv`.
         reward: Weights that replace the default ones, keyed by name; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default
             is 48 training courses, which are laid out once.
         put_back: Whether to put the vehicle back on the lane after a collision, where its bumper's
             reflex keeps it from going forward for 0.75 s.
+        randomise: As in `VehicleEnv`.
         camera: Whether `world.picture()` shows the images of the profile's camera.
+        render_mode: As in `VehicleEnv`.
     """
 
     def __init__(

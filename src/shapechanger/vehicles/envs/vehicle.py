@@ -267,7 +267,10 @@ class WaypointEnv(WaypointView, DriveEnv):
     v1: the first.
 
     Args:
-        vehicle, robot, courses, render_mode: As of `VehicleEnv`, with its errors.
+        vehicle: As in `VehicleEnv`, with its errors.
+        robot: As in `VehicleEnv`.
+        courses: As in `VehicleEnv`.
+        render_mode: As in `VehicleEnv`.
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
             for a boat, so that vehicles differ in their bodies alone.
         sensed: Whether speed and reward are those that the sensors of `VehicleEnv` measure, instead
