@@ -58,7 +58,9 @@ def mutants() -> Iterator[Row]:
     patterns = [f"shapechanger.{MODULES[name].replace('/', '.')}*" for name in chosen]
     children = str(os.cpu_count() or 1)
     command = [sys.executable, "-m", "mutmut", "run", "--max-children", children, *patterns]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    run = subprocess.run(command, check=False, capture_output=True, text=True)
+    if run.returncode:
+        raise RuntimeError(f"mutmut stopped with {run.returncode}: {run.stdout}{run.stderr}")
     equivalent = {
         (one["function"], one["line"]) for one in tomllib.loads(_EQUIVALENT.read_text())["mutant"]
     }

@@ -54,9 +54,17 @@ def test_all_is_the_sum_of_the_extras_for_users() -> None:
 
 
 @pytest.mark.sources
-def test_coverage_gate_finds_its_files() -> None:
-    """Every pattern of the coverage configuration matches a file."""
-    patterns: list[str] = _PYPROJECT["tool"]["coverage"]["run"]["include"]
+def test_settings_of_tools_find_their_files() -> None:
+    """Every pattern of the settings of coverage and of mutmut matches a file."""
+    tools = _PYPROJECT["tool"]
+    mutmut: dict[str, list[str]] = tools["mutmut"]
+    ignored = [one.removeprefix("--ignore=") for one in mutmut["pytest_add_cli_args"] if "/" in one]
+    patterns: list[str] = [
+        *tools["coverage"]["run"]["include"],
+        *mutmut["only_mutate"],
+        *mutmut["pytest_add_cli_args_test_selection"],
+        *ignored,
+    ]
     assert [pattern for pattern in patterns if not list(_ROOT.glob(pattern))] == []
 
 
