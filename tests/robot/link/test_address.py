@@ -37,7 +37,7 @@ def test_addresses_are_parsed(text: str, address: Address) -> None:
     [
         *("", "car local", "https://car.local", "user@car", "-car", "x" * 64, "a." * 127),
         *("300.1.1.1", "1.2.3", "[::1", "[car]:5000", "[::1]5000", "::1]", "[]:80"),
-        *("[fe80::1%a/b]", "[fe80::1%a@b]"),
+        *("[fe80::1%a/b]", "[fe80::1%a@b]", "fe80::1%a/b", "fe80::1%a@b"),
         *("car:", "car:0", "car:65536", "car:000080", "car:٣", "car:12:13", "[::1]:"),
     ],
 )

@@ -1,5 +1,7 @@
 """Keys, proofs of possession, and fingerprints of certificates."""
 
+import hmac
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -28,6 +30,16 @@ def test_a_proof_is_bound_to_all_its_inputs(
     # HMAC pads short keys with zeros (RFC 2104); real keys have 16 bytes.
     one, two = (one[0].ljust(64, b"\0"), *one[1:]), (two[0].ljust(64, b"\0"), *two[1:])
     assert is_proof(make_proof(*one), *two) == (one == two)
+
+
+def test_the_proof_of_the_protocol_does_not_change() -> None:
+    """Robots and clients of other versions compute it alone."""
+    key, nonce, certificate = bytes(range(16)), bytes(32), b"c" * 32
+    message = b"".join(
+        len(part).to_bytes(4, "big") + part
+        for part in (b"shapechanger link 1", nonce, certificate, b"person")
+    )
+    assert make_proof(key, nonce, certificate, "person") == hmac.digest(key, message, "sha256")
 
 
 @given(proof=st.binary(max_size=64))

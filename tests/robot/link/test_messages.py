@@ -51,6 +51,8 @@ def test_a_damaged_message_is_refused_or_within_its_bounds(
 def test_a_large_message_is_refused_before_it_is_read() -> None:
     with pytest.raises(LinkError, match="larger than the 65536 allowed"):
         decode_client_message(bytes(messages.MAX_CLIENT_MESSAGE + 1))
+    with pytest.raises(LinkError, match="Not a valid message"):
+        decode_client_message(bytes(messages.MAX_CLIENT_MESSAGE))
 
 
 @pytest.mark.parametrize(
