@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
+from sb3_contrib import TQC
 from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
@@ -23,7 +26,13 @@ from shapechanger.errors import MissingExtra, SpaceMismatch, TransplantError
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy, Hold
 from shapechanger.transfer.transplant import transplant, transplant_normalisation
-from shapechanger.transfer.transplant.layers import critic_actions, squashed_outputs
+from shapechanger.transfer.transplant.layers import (
+    Scaling,
+    critic_actions,
+    gaussian_outputs,
+    observation_affine,
+    squashed_outputs,
+)
 from tests.transfer.body_map.bodies import (
     ANT_FLIP,
     ANT_SWAP,
@@ -32,6 +41,7 @@ from tests.transfer.body_map.bodies import (
     carts,
     motor,
     pendulum_action,
+    pendulum_observation,
 )
 
 Model = PPO | SAC
@@ -225,8 +235,8 @@ def test_the_transplanted_networks_compute_the_same(
     check_same_function(source, target, body_map, 1e-12)
 
 
-@each_class
-def test_the_identity_changes_no_bit(kind: type[Model]) -> None:
+@pytest.mark.parametrize("kind", [PPO, SAC, TQC])
+def test_the_identity_changes_no_bit(kind: type[Any]) -> None:
     source = trained(kind, MAPS["identity"], normalised=True)
     env = envs(ant_observation(), ant_action(), normalised=True)
     target = transplant(source, MAPS["identity"], env)
@@ -407,13 +417,18 @@ def test_statistics_of_the_target_env_are_replaced(kind: type[Model]) -> None:
 
 
 @each_class
-def test_statistics_can_be_folded_into_the_weights(kind: type[Model]) -> None:
+@pytest.mark.parametrize(("given", "epsilon"), [(False, 0.5), (True, 1e-8)])
+def test_statistics_can_be_folded_into_the_weights(
+    kind: type[Model], given: bool, epsilon: float
+) -> None:
     """Without normalisation of the target, the statistics go into the first layer."""
     body_map = MAPS["mirror"]
     source = trained(kind, body_map, normalised=True)
-    source.get_vec_normalize_env().clip_obs = np.inf
+    theirs = source.get_vec_normalize_env()
+    theirs.clip_obs, theirs.epsilon = np.inf, epsilon
     source.policy.double()
-    target = transplant(source, body_map, targets(body_map))
+    statistics = theirs.obs_rms if given else None  # Alone, they have SB3's default epsilon.
+    target = transplant(source, body_map, targets(body_map), normalisation=statistics)
     check_same_function(source, target, body_map, 1e-12)
 
 
@@ -454,6 +469,11 @@ def test_rewards_alone_may_be_normalised() -> None:
     target = transplant(source, body_map, env)
     assert env.ret_rms.var == 7.0
     check_same_function(source, target, body_map, 1e-4)
+    source.get_vec_normalize_env().norm_reward = False
+    env = targets(body_map, normalised=True)
+    env.norm_obs = False
+    transplant(source, body_map, env)
+    assert env.ret_rms.var == 1.0
 
 
 def test_settings_are_kept_or_changed() -> None:
@@ -466,10 +486,15 @@ def test_settings_are_kept_or_changed() -> None:
     assert target.clip_range(1.0) == 0.3  # type: ignore[operator]
     assert (target.seed, target.gae_lambda, target.n_steps) == (3, 0.8, 32)
     assert target.policy_kwargs == ppo.policy_kwargs
-    assert target.policy_kwargs is not ppo.policy_kwargs
+    assert target.policy_kwargs["net_arch"] is not ppo.policy_kwargs["net_arch"]
+    short = trained(PPO, body_map, stats_window_size=7)
+    assert transplant(short, body_map, env)._stats_window_size == 7
 
-    sac = trained(SAC, body_map, tau=0.1, n_steps=3, train_freq=(2, "step"))
+    settings = {"n_steps": 3, "replay_buffer_kwargs": {"handle_timeout_termination": False}}
+    sac = trained(SAC, body_map, tau=0.1, train_freq=(2, "step"), **settings)
     moved = transplant(sac, body_map, env)
+    assert moved.replay_buffer_kwargs["handle_timeout_termination"] is False
+    assert transplant(sac, body_map, env, n_steps=1).replay_buffer_class is ReplayBuffer
     assert (moved.tau, moved.n_steps, moved.target_entropy) == (0.1, 3, -12.0)
     assert moved.train_freq == sac.train_freq
     assert moved.replay_buffer_class is sac.replay_buffer_class
@@ -541,6 +566,15 @@ def test_other_settings_of_a_policy_are_moved(kind: type[Model], policy: dict[st
     check_same_function(source, transplant(source, body_map, env), body_map, 1e-12)
 
 
+class OwnPolicy(ActorCriticPolicy):
+    """An unsupported policy."""
+
+
+def _custom_policy(body_map: BodyMap) -> Any:
+    env = envs(body_map.source_observation, body_map.source_action)
+    return PPO(OwnPolicy, env, n_steps=32, batch_size=16)
+
+
 class Own(FlattenExtractor):
     """An unsupported layer."""
 
@@ -548,9 +582,14 @@ class Own(FlattenExtractor):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda ants: trained(PPO, ants, use_sde=True), "explores with gSDE"),
-        (lambda ants: trained(SAC, ants, use_sde=True), "explores with gSDE"),
+        (lambda ants: trained(PPO, ants, use_sde=True), r"^This policy explores with gSDE\. "),
+        (lambda ants: trained(SAC, ants, use_sde=True), r"^This policy explores with gSDE\. "),
         (_custom_mlp, "has a Sequential instead of a MlpExtractor"),
+        (
+            lambda ants: trained(PPO, ants, policy={"features_extractor_class": Own}),
+            "extracts features with Own",
+        ),
+        (_custom_policy, r"^This model has a OwnPolicy\. "),
         (
             lambda ants: trained(SAC, ants, policy={"features_extractor_class": Own}),
             "extracts features with Own",
@@ -580,6 +619,41 @@ def test_spaces_must_be_those_of_the_map(wrong: str) -> None:
     body_map = there if wrong == "target" else there.inverse()
     with pytest.raises(SpaceMismatch, match=f"layout of the {wrong} observation has 59"):
         transplant(trained(PPO, stay), body_map, targets(stay))
+    arms = Layout((motor("a"), motor("b")))
+    rules = {"a/motor": "copy slide/motor", "b/motor": "zero"}
+    wider = carts(arms, arms) if wrong == "source" else carts(pendulum_action(), arms, rules=rules)
+    model = trained(PPO, carts(pendulum_action(), pendulum_action()))
+    with pytest.raises(SpaceMismatch, match=f"layout of the {wrong} action has 2"):
+        transplant(model, wider, envs(pendulum_observation(), pendulum_action()))
+
+
+def test_gaussian_outputs_by_hand() -> None:
+    """Models act from -1 to 1; the map is in the units of the envs."""
+    source = Layout((Feature("a", "1", 0.0, 4.0), Feature("lost", "1", -1.0, 1.0)))
+    target = Layout((Feature("a", "1", -2.0, 14.0), Feature("held", "1", 0.0, 8.0)))
+    rules = {"a": Copy("a", 3.0), "held": Hold(6.0)}
+    body_map = carts(source, target, rules=rules)
+    own = gym.spaces.Box(-1.0, 1.0, (2,))
+    outputs = gaussian_outputs(body_map, own, own)
+    # The env's action 3 (2 + 2 x) of the model's x is 6 + 8 y of the target's.
+    np.testing.assert_allclose(outputs.mean.matrix, [[0.75, 0.0], [0.0, 0.0]])
+    np.testing.assert_allclose(outputs.mean.offset, [0.0, 0.5])
+    np.testing.assert_allclose(outputs.log_std.offset, [np.log(0.75), 0.0])
+    assert outputs.mean.fresh.dtype == np.bool_
+    shifted = Layout((Feature("a", "1", 2.0, 10.0), target["held"]))
+    moved = gaussian_outputs(carts(source, shifted, rules=rules), own, own)
+    np.testing.assert_allclose(moved.mean.offset, [(3.0 * 2.0 - 6.0) / 4.0, 0.5])
+
+
+def test_only_constant_numbers_are_clipped_before_the_network() -> None:
+    here = Layout((Feature("above", "m"), Feature("below", "m"), Feature("copied", "m")))
+    there = Layout((Feature("copied", "m"),))
+    body_map = BodyMap.between(
+        *(here, there, pendulum_action(), pendulum_action()), otherwise="hold"
+    )
+    mean, sigma = np.array([-90.0, 90.0, -90.0]), np.ones(3)
+    affine = observation_affine(body_map, Scaling(mean, sigma, 10.0), Scaling.none(1))
+    np.testing.assert_array_equal(affine.offset, [10.0, -10.0, 90.0])
 
 
 def test_squashed_outputs_by_hand() -> None:
