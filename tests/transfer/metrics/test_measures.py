@@ -358,6 +358,16 @@ def test_both_ways_of_counting_use_the_same_resamples() -> None:
     rng = np.random.default_rng(draw)
     transfer = forward_transfer(*curves, rng=rng)
     assert result.in_target_steps.forward_transfer == transfer
+    returns = 100.0 + 50.0 * np.random.default_rng(1).normal(size=(2, 5, 3))
+    arm, scratch = (LearningCurves(THREE, one) for one in returns)
+    ratio = auc_ratio(
+        REFERENCE.scores(arm), REFERENCE.scores(scratch), rng=np.random.default_rng(draw)
+    )
+    of_five = summarise(
+        *(scratch, arm, REFERENCE), source_steps=0, rng=np.random.default_rng(0), last_k=1
+    )
+    assert of_five.in_target_steps.auc_ratio == ratio
+    assert ratio.low is not None
     undefined = summary(reference=Reference(zero=400.0, one=300.0)).in_target_steps
     assert [time.threshold for time in undefined.times_to_threshold] == [0.25, 0.5, 0.75, 0.9]
     assert all(time.arm is time.scratch is None for time in undefined.times_to_threshold)
