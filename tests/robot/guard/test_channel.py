@@ -48,6 +48,13 @@ def test_a_malformed_datagram_is_reported_and_the_next_order_arrives(ends: Ends)
     assert [text[:13] for text in malformed] == ["Invalid order", "A datagram is"]
 
 
+def test_a_state_for_a_closed_socket_means_a_lost_daemon(ends: Ends) -> None:
+    channel, daemon = ends
+    daemon.close()
+    assert not channel.send(NO_STATE)
+    assert channel.lost is True
+
+
 @pytest.mark.parametrize("unread", [False, True])
 def test_a_closed_socket_means_a_lost_daemon(ends: Ends, unread: bool) -> None:
     """States that it left unread reset the connection, which is no order."""
@@ -73,10 +80,14 @@ def test_a_closed_life_pipe_means_a_lost_daemon(ends: Ends) -> None:
     for fd in (watched, more):
         socket.send_fds(daemon, [b"life"], [fd])
         os.close(fd)
+    (third, last) = os.pipe()
+    socket.send_fds(daemon, [b"two"], [third, third])
+    os.close(third)
     assert channel.orders() == ([], [])
-    with pytest.raises(BrokenPipeError):
-        os.write(other, b"x")
-    os.close(other)
+    for unwatched in (other, last):
+        with pytest.raises(BrokenPipeError):
+            os.write(unwatched, b"x")
+        os.close(unwatched)
     assert channel.orders() == ([], [])
     assert not channel.lost
     assert len(channel.filenos()) == 2

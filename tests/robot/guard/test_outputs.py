@@ -3,14 +3,15 @@
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock, call
+from unittest.mock import MagicMock, Mock, call
 
 import pytest
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, output_values
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard import outputs
-from shapechanger.robot.guard.outputs import OutputBank, estimated, make_safe
+from shapechanger.robot.guard.outputs import OutputBank, estimated, make_safe, preload
+from shapechanger.robot.hardware import REAL
 from tests.robot.guard.plans import car
 from tests.robot.guard.recording import Record, connect
 
@@ -169,3 +170,21 @@ def test_a_bus_tells_why_it_is_not_ready(calls: Mock) -> None:
     calls.bus.ready.assert_called_once_with(alive)
     calls.bus.ready.side_effect = RobotError("servo 3 is hot.")
     assert bank.ready(alive) == "servo 3 is hot."
+
+
+@pytest.mark.parametrize("source", [REAL, "module:function"])
+def test_what_a_stop_needs_is_imported_before(monkeypatch: pytest.MonkeyPatch, source: str) -> None:
+    """Missing libraries are no failure: a robot without pins may lack them."""
+    found = {name: MagicMock() for name in ("load", "OUTPUTS", "PULSES")}
+    for name, mock in found.items():
+        monkeypatch.setattr(outputs, name, mock)
+    imported = Mock(side_effect=ImportError)
+    monkeypatch.setattr("importlib.import_module", imported)
+    servo = OutputPlan("steer", "servo", settings={"over": "pca9685"})
+    preload(GuardPlan("car", (), (OutputPlan("drive", "esc"), servo)), source)
+    found["load"].assert_called_once_with(source)
+    assert found["OUTPUTS"].__getitem__.mock_calls == [call("esc"), call("servo")]
+    found["PULSES"].__getitem__.assert_called_once_with("pca9685")
+    of_a_pi = ["shapechanger.robot.lgpio_pins", "gpiozero.pins.lgpio", "smbus2"]
+    expected = ["gpiozero", *(of_a_pi if source == REAL else [])]
+    assert imported.mock_calls == [call(name) for name in expected]

@@ -18,7 +18,7 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 
 from shapechanger.contract.plan import GuardPlan, SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard import sensors
+from shapechanger.robot.guard import process, sensors
 from shapechanger.robot.guard.channel import (
     DaemonChannel,
     GuardState,
@@ -27,7 +27,8 @@ from shapechanger.robot.guard.channel import (
     decode_state,
     encode,
 )
-from shapechanger.robot.guard.process import Guard
+from shapechanger.robot.guard.process import Guard, main
+from shapechanger.robot.guard.running import AFTER_FAILURE, GUARD, ServePlan, plan_fd
 from tests.robot.guard.plans import MS, arm, command, quick_car
 
 _T0 = 1_000 * MS
@@ -480,3 +481,138 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
         Guard(replace(quick_car(), sensors=plans), hardware, Mock(), logging.getLogger("test"))
     good.close.assert_called_once()
     OutputDevice(22, pin_factory=hardware.factory).close()  # The pin is free.
+
+
+class _Program:
+    """`main` in this process, with simulated hardware; times are ms after the start."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.clock = _Clock()
+        self.factory = MockFactory(pin_class=MockPWMPin)
+        self.hardware = SimpleNamespace(
+            clock=self.clock, pin_factory=lambda: self.factory, close=Mock()
+        )
+        self.connect = Mock(return_value=self.hardware)
+        self.run_promptly = Mock()
+        monkeypatch.setattr(process, "connect", self.connect)
+        monkeypatch.setattr(process, "run_promptly", self.run_promptly)
+        self.daemon, self._guards_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.supervisor, self._heart = socket.socketpair()
+        self.supervisor.setblocking(False)
+        plan = ServePlan(replace(quick_car(), sensors=()), {}, ("module:function", "argument"))
+        self._opened = [plan_fd(plan)]
+
+    def at(self, ms: int, event: Callable[[], object]) -> None:
+        self.clock.events.append((_T0 + ms * MS, event))
+
+    def run(self, *arguments: str) -> None:
+        self._opened.append(self._heart.detach())  # It stays open until the process exits.
+        fds = {
+            "--plan-fd": self._opened[0],
+            "--daemon-fd": self._guards_end.detach(),
+            "--heartbeat-fd": self._opened[1],
+        }
+        main([*arguments, *chain.from_iterable((name, str(fd)) for name, fd in fds.items())])
+
+    def states(self) -> list[GuardState]:
+        """Return all states; the socket must have ended."""
+        return [decode_state(data) for data in iter(lambda: self.daemon.recv(1 << 16), b"")]
+
+    def close(self) -> None:
+        for fd in self._opened:
+            os.close(fd)
+        for one in (self.daemon, self.supervisor, self._guards_end, self._heart):
+            one.close()
+
+
+@pytest.fixture
+def program(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Program]:
+    """The program; signals and the settings of the log are restored afterwards."""
+    monkeypatch.setattr(logging, "raiseExceptions", True)
+    numbers = (signal.SIGTERM, signal.SIGINT)
+    handlers = [signal.signal(number, Mock()) for number in numbers]
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    made = _Program(monkeypatch)
+    yield made
+    made.close()
+    for number, handler in zip(numbers, handlers, strict=True):
+        signal.signal(number, handler)
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_the_program_guards_until_a_signal(
+    program: _Program, capfd: pytest.CaptureFixture[str], number: signal.Signals
+) -> None:
+    duties: list[float] = []
+    program.at(1, lambda: program.daemon.send(encode(arm(_T0))))
+    program.at(2, lambda: program.daemon.send(encode(command(1, _T0))))
+    program.at(40, lambda: duties.append(program.factory.pin(22).state))
+    program.at(50, lambda: signal.raise_signal(number))
+    program.at(90, program.supervisor.close)
+    program.run()
+    assert capfd.readouterr().err.splitlines() == [
+        "guard: guards test car with 2 outputs.",
+        *("guard: Not armed.", "guard: Armed."),
+        f"guard: ends: ended by {number.name}.",
+    ]
+    assert duties == [0.5]
+    assert program.factory.pin(22).state == 0.0
+    assert any(state.applied_seq == 1 for state in program.states())
+    program.connect.assert_called_once_with("module:function", "argument")
+    program.run_promptly.assert_called_once_with(GUARD)
+    program.hardware.close.assert_called_once_with()
+    # Beats, and no end of the stream before the process exits.
+    assert program.supervisor.recv(1 << 16).startswith(b".")
+    with pytest.raises(BlockingIOError):
+        program.supervisor.recv(1)
+
+
+def test_a_signal_before_the_guard_is_ready_ends_it(
+    program: _Program, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The outputs are opened, put to rest and closed."""
+    connect = program.connect
+
+    def connect_and_end(*arguments: str) -> object:
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+        return connect.return_value
+
+    connect.side_effect = connect_and_end
+    program.at(90, program.supervisor.close)
+    program.run()
+    assert capfd.readouterr().err.splitlines()[-1].startswith("guard: ends: ended by SIG")
+    assert program.factory.pin(22).state == 0.0
+
+
+def test_the_program_starts_in_emergency_stop_after_a_failure(program: _Program) -> None:
+    program.at(5, lambda: program.daemon.send(encode(Order("end"))))
+    program.run(AFTER_FAILURE)
+    assert {state.emergency for state in program.states()} == {True}
+
+
+def test_the_program_fails_if_an_output_does_not_rest(
+    program: _Program, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    stuck = Mock(side_effect=OSError("the pin is stuck"))
+    program.at(5, lambda: monkeypatch.setattr(program.factory.pin(22), "_set_state", stuck))
+    program.at(15, lambda: program.daemon.send(encode(Order("end"))))
+    with pytest.raises(SystemExit) as ended:
+        program.run()
+    assert ended.value.code == 1
+    last = capfd.readouterr().err.splitlines()[-1]
+    assert last == "guard: ends, for RobotError: not all outputs are at rest"
+    program.hardware.close.assert_called_once_with()
+
+
+def test_wrong_arguments_of_the_program_are_logged(
+    program: _Program, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--plan-fd", "3"])
+    assert ended.value.code == 1
+    assert capfd.readouterr().err == (
+        "guard: ends, for ValueError: This takes --plan-fd N --daemon-fd N --heartbeat-fd N, "
+        "not --plan-fd 3.\n"
+    )
