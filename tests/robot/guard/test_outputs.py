@@ -153,8 +153,15 @@ def test_each_failure_of_an_output_is_reported(calls: Mock) -> None:
         driver.configure_mock(**{"write.side_effect": stuck, "close.side_effect": stuck})
     assert bank.rest(7) == _STUCK
     assert bank.close(8) == _STUCK * 2
+    assert calls.drive.write.mock_calls[-1] == call(0.0, 8)
     itself = OutputPlan("arm", "bus_servo", mix={"throttle": 1.0})
     assert make_safe(replace(_CAR, outputs=(itself, *_CAR.outputs)), Mock()) == _STUCK
+
+
+def test_a_failure_of_a_bus_is_reported(calls: Mock) -> None:
+    bank = OutputBank(_CAR, Mock())
+    calls.bus.flush.side_effect = OSError("no answer")
+    assert bank.rest(7) == ["no answer"]
 
 
 def test_an_output_that_cannot_be_opened_closes_those_before(calls: Mock) -> None:

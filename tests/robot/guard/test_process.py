@@ -175,6 +175,7 @@ def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> 
     assert (stopped.at_ns, stopped.stop_reason) == (_T0 + 250 * MS, "No fresh command.")
     assert acting.applied == (0.5, 0.5)
     assert acting.applied_ns == acting.at_ns == _T0 + 1 * MS
+    assert stopped.applied_ns is None
     # The drive is written before the steering.
     assert list(acting.outputs.items()) == [("drive", 0.5), ("steer", 0.5)]
 
@@ -291,6 +292,7 @@ def test_the_log_has_a_line_for_each_event(
     bench = make(sensors={"bumper": _sensor(good, good, good, RobotError("No answer."), good)})
     bench.arms()
     bench.send(15, b"{")
+    bench.send(25, b"{")
     bench.send(65, Order("disarm", reason="lunch."))
     bench.run(80)
     failing = Mock(side_effect=RobotError("No power."))
@@ -298,7 +300,8 @@ def test_the_log_has_a_line_for_each_event(
     bench.guard.close()
     assert bench.guard.is_safe is False
     assert [record.getMessage()[:30] for record in caplog.records] == [
-        *("Not armed.", "Armed.", "1 datagrams were no orders: In"),
+        *("Not armed.", "Armed."),
+        *("1 datagrams were no orders: In", "2 datagrams were no orders: In"),
         *("Sensor bumper fails: No answer", "Sensor bumper responds again."),
         *("Disarmed: lunch.", "Output steer: No power."),
     ]
@@ -457,7 +460,9 @@ def test_a_sensor_that_is_slow_stops_the_robot(make: _Make) -> None:
     assert any(state.applied_seq == 1 and state.at_ns > slow[-1].at_ns for state in bench.states)
 
 
-def test_the_outputs_rest_before_anything_is_closed(make: _Make) -> None:
+def test_the_outputs_rest_before_anything_is_closed(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
     sensor = _sensor({"bump": 0.0})
     bench = make(sensors={"bumper": sensor})
     bench.arms()
@@ -465,8 +470,39 @@ def test_the_outputs_rest_before_anything_is_closed(make: _Make) -> None:
     assert bench.duty() == 0.5
     duties: list[float] = []
     sensor.close.side_effect = lambda: duties.append(bench.duty())
+    write = Mock(wraps=bench.drivers["drive"].write)
+    monkeypatch.setattr(bench.drivers["drive"], "write", write)
     bench.guard.close()
     assert duties == [0.0]
+    assert {one.args for one in write.mock_calls} == {(0.0, bench.clock.time_ns)}
+    assert write.call_count == 2  # And once more before the pins are closed.
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"), [(RobotError("No answer."), "No answer."), (KeyError(), "KeyError")]
+)
+def test_the_error_of_an_output_that_recovers_at_once_is_named(
+    make: _Make, monkeypatch: pytest.MonkeyPatch, error: Exception, reason: str
+) -> None:
+    bench = make()
+    bench.arms()
+    write = Mock(side_effect=chain([error], repeat(0.0)))
+    bench.at(31, lambda: monkeypatch.setattr(bench.drivers["drive"], "write", write))
+    assert bench.run(60).stop_reason == f"Emergency stop: {reason}"
+
+
+def test_all_outputs_that_fail_are_named(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = make()
+    bench.arms()
+    write = Mock(side_effect=RobotError("No answer."))
+    for name in ("drive", "steer"):
+        bench.at(31, lambda name=name: monkeypatch.setattr(bench.drivers[name], "write", write))
+    bench.arms(46, 1)
+    bench.at(60, monkeypatch.undo)
+    state = bench.run(80)
+    both = "Output drive: No answer. Output steer: No answer."
+    assert f"NOT at rest: {both} Emergency stop: No answer." in bench.reasons()
+    assert state.stop_reason == f"Emergency stop: {both}"
 
 
 def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
@@ -480,6 +516,7 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
     with pytest.raises(RobotError, match="No answer"):
         Guard(replace(quick_car(), sensors=plans), hardware, Mock(), logging.getLogger("test"))
     good.close.assert_called_once()
+    assert [one.args for one in chip.open.mock_calls] == [(plan, hardware) for plan in plans]
     OutputDevice(22, pin_factory=hardware.factory).close()  # The pin is free.
 
 

@@ -78,6 +78,7 @@ def _driving(plan: GuardPlan | None = None, *values: float) -> _Armed:
 
 def test_a_new_guard_is_released_and_not_armed() -> None:
     rules = Rules(quick_car(stop=StopPlan(hold_ms=100, then="release")), _T0)
+    assert rules.senses == Sensing()
     assert "Not armed" in rules.offer(command(1, _T0), _T0)
     assert rules.tick(_T0) == OutputDecision((0.0, 0.0), True, "Not armed.", 0, None)
     rules.offer(arm(_T0), _T0)
@@ -92,6 +93,9 @@ def test_a_command_ends_exactly_at_its_deadline() -> None:
     before, after = robot.change(240)
     assert (before.actions, before.seq, before.stop_reason) == ((0.5, 0.5), 1, "")
     assert (after.actions, after.seq, after.stop_reason) == ((0.0, 0.0), None, "No fresh command.")
+    assert robot.rules.next_wake_ns(robot.now_ns) > robot.now_ns
+    late = "Command 2 is 251 ms old; it may act for 250 ms."
+    assert robot.order(age_ms=251) == late
     robot = _driving()
     assert [robot.rules.stands(_T0 + 250 * MS - left) for left in (1, 0)] == [False, True]
 
@@ -105,7 +109,8 @@ def test_an_emergency_stop_keeps_its_first_reason() -> None:
     assert robot.tick().stop_reason == "Emergency stop: a child."
     assert "Emergency stop: a child." in robot.order()
     assert "2 emergency stops" in rules.offer(arm(_T0, 1), _T0)
-    assert "only a person" in rules.offer(arm(_T0, 2, person=False), _T0)
+    only = "Not armed: only a person ends an emergency stop."
+    assert rules.offer(arm(_T0, 2, person=False), _T0) == only
     assert "1.5 s old" in rules.offer(arm(_T0 - 1_500 * MS, 2), _T0)
     robot.arm()
     assert robot.ask(0.5) == (0.5, "")
@@ -113,6 +118,8 @@ def test_an_emergency_stop_keeps_its_first_reason() -> None:
         robot.arm()
         rules.offer(order, _T0)
         assert robot.tick().stop_reason.startswith(f"Disarmed: {reason}")
+    rules.offer(Order("disarm"), _T0)
+    assert robot.tick().stop_reason == "Disarmed."
 
 
 def test_a_pressed_button_stops_and_prevents_arming() -> None:
@@ -338,6 +345,12 @@ _HEALTH = LimitPlan(low_battery_v=0.8, high_temperature_c=80.0)
         (_HEALTH, "battery", 0.8, ""),
         (_HEALTH, "temperature", 82.0, "The computer has 82 C, more than 80 C."),
         (_HEALTH, "temperature", 80.0, ""),
+        (
+            LimitPlan(high_temperature_c=1.0),
+            "temperature",
+            2.0,
+            "The computer has 2 C, more than 1 C.",
+        ),
         (_HEALTH, "speed", 1.0, ""),
         (LimitPlan(), "battery", -1.0, ""),
         (LimitPlan(), "temperature", 90.0, ""),
