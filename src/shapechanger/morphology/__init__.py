@@ -16,16 +16,6 @@ try:
 except ImportError as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.morphology.body import (
-    Body,
-    as_body,
-    compile_body,
-    from_json,
-    interpolate,
-    reason_of,
-    reshape,
-    to_json,
-)
 from shapechanger.morphology.edits import EDITS, Edit
 from shapechanger.morphology.edits.limbs import (
     AddFreeJoint,
@@ -55,6 +45,16 @@ from shapechanger.morphology.edits.values import (
     Mass,
     Stiffness,
     TotalMass,
+)
+from shapechanger.morphology.families import (
+    Body,
+    as_body,
+    compile_body,
+    from_json,
+    interpolate,
+    reason_of,
+    reshape,
+    to_json,
 )
 from shapechanger.morphology.spec import name_elements
 

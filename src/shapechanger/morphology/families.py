@@ -1,38 +1,206 @@
-"""Families of bodies: one model each, the named bodies that edits make from it, and its splits."""
+"""Bodies as values: edits of a model, their JSON, those between two, and families of them.
+
+>>> from shapechanger.morphology import Stretch, to_json
+>>> to_json([Stretch("*shank*", 1.5)])
+'[{"edit":"stretch","body":"*shank*","factor":1.5}]'
+"""
 
 from __future__ import annotations
 
+import difflib
+import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, cast, get_args
 
+import msgspec
 import mujoco
 import numpy as np
 
-from shapechanger.errors import MorphologyError, UnknownName
-from shapechanger.morphology import (
-    Body,
-    Edit,
-    Friction,
-    Gear,
-    Mass,
-    Stretch,
-    as_body,
-    name_elements,
-    reshape,
-)
+from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
+from shapechanger.morphology.edits import EDITS, Edit, part_of_the_way
+from shapechanger.morphology.edits.places import Stretch
+from shapechanger.morphology.edits.values import Friction, Gear, Mass
+from shapechanger.morphology.spec import make_explicit, name_elements
+from shapechanger.morphology.spec.carried import carried
+
+Body = tuple[Edit, ...]
+"""The edits, in order, that make a body from the model of its family."""
+
+# MuJoCo takes sparse constraint Jacobians from 60 degrees of freedom on. Newton's solver of this
+# version then factorises a wrong Hessian, which 4.0.1 mends (google-deepmind/mujoco#3767).
+_WRONG_SPARSE: Final = "4.0.0"
+# Share of the training bodies that have one of the family's parts.
+_WITH_PART: Final = 0.5
+
+
+def to_json(body: Iterable[Edit]) -> str:
+    """Return the edits as a JSON list of tagged objects."""
+    return msgspec.json.encode(list(body)).decode()
+
+
+def from_json(text: str | bytes) -> Body:
+    """Read a body from JSON as `to_json` writes it; a single object is a body of one edit.
+
+    Raises:
+        UnknownName: If there is no edit of a kind, or no field of a name.
+        MorphologyError: If the text is not such a list, or a number is out of its range.
+    """
+    try:
+        # A text that was read from a file may begin with a byte-order mark.
+        parsed: Any = json.loads(text.removeprefix("\ufeff") if isinstance(text, str) else text)
+    except (ValueError, RecursionError) as error:  # Not JSON, not UTF-8, or nested too deeply.
+        raise MorphologyError(f"A body must be a JSON list of edits: {error}.") from error
+    return as_body(cast("list[Any]", parsed) if isinstance(parsed, list) else [parsed])
+
+
+def as_body(value: Edit | Iterable[Edit] | str) -> Body:
+    """Return a body from one edit, several, or their JSON, which may be parsed already.
+
+    Raises:
+        UnknownName: As of `from_json`.
+        MorphologyError: If `value` is something else.
+    """
+    if isinstance(value, str):
+        return from_json(value)
+    given: Any = value  # Not checked at run time.
+    one = isinstance(given, Edit | Mapping) or not isinstance(given, Iterable)
+    return tuple(map(_edit, [given] if one else cast("Iterable[Any]", given)))
+
+
+def _edit(item: Any) -> Edit:
+    if isinstance(item, Edit):
+        return item
+    if not isinstance(item, Mapping) or "edit" not in item:
+        raise MorphologyError(
+            "A body is made of edits such as Stretch('shank_*', 1.5), in JSON objects with the key "
+            f'"edit", not of {item!r}.'
+        )
+    fields = dict(cast("Mapping[str, Any]", item))
+    kind = EDITS.get(str(fields["edit"]))
+    if kind is None:
+        raise UnknownName("edit", str(fields["edit"]), EDITS)
+    for name in fields:
+        if name not in ("edit", *kind.__struct_fields__):
+            raise UnknownName(f"field of {fields['edit']!r}", name, kind.__struct_fields__)
+    try:
+        return msgspec.convert(fields, kind)
+    except msgspec.ValidationError as error:
+        raise MorphologyError(f"{fields['edit']}: {error}") from error
+
+
+def interpolate(a: Body, b: Body, alpha: float) -> Body:
+    """Return a body on the way from `a` to `b`.
+
+    Both ends are exact: 0 returns `a` itself, 1 returns `b` itself. Physical quantities are
+    continuous in `alpha`, except the inertia of a segment that is split, which jumps by that of the
+    rounded ends of its parts. Dimensions cannot be continuous: a limb or motor that only `b` has
+    exists, small and weak, for every `alpha` above 0, and one that only `a` has, ever smaller, for
+    every `alpha` below 1.
+
+    Args:
+        a: Body at 0.
+        b: Body at 1, made from the same model as `a`.
+        alpha: Position on the way, 0 to 1.
+
+    Raises:
+        MorphologyError: If `alpha` lies outside [0, 1].
+    """
+    if not 0.0 <= alpha <= 1.0:
+        raise MorphologyError(f"alpha must be between 0 and 1, got {alpha}.")
+    if alpha in (0.0, 1.0):
+        return a if alpha == 0.0 else b
+    steps: list[Edit] = []
+    matcher = difflib.SequenceMatcher(None, [_key(x) for x in a], [_key(x) for x in b], False)
+    for kind, *ends in matcher.get_opcodes():
+        old, new = a[ends[0] : ends[1]], b[ends[2] : ends[3]]
+        if kind == "equal":
+            steps += [_between(x, y, alpha) for x, y in zip(old, new, strict=True)]
+        else:
+            steps += [edit.partly(1.0 - alpha) for edit in old]
+            steps += [edit.partly(alpha) for edit in new]
+    return tuple(steps)
+
+
+def _key(edit: Edit) -> Hashable:
+    """Return what two edits must share to be interpolated: everything but their numbers.
+
+    A motor that only one of two has exists between them, with a gear that fades to zero.
+    """
+    values: dict[str, Any] = msgspec.structs.asdict(edit)
+    return type(edit), tuple(
+        (name, None if isinstance(value, int | float | tuple) else value)
+        for name, value in values.items()
+        if value is not None and name != "gear"
+    )
+
+
+def _between(x: Edit, y: Edit, alpha: float) -> Edit:
+    changes: dict[str, Any] = {}
+    new: dict[str, Any] = msgspec.structs.asdict(y)
+    for name, old in msgspec.structs.asdict(x).items():
+        if old != new[name]:
+            start, end = (np.array(number or 0.0, float) for number in (old, new[name]))
+            value: Any = part_of_the_way(start, end, alpha)
+            changes[name] = tuple(value.tolist()) if isinstance(old, tuple) else float(value)
+    return msgspec.structs.replace(x, **changes)
+
+
+def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
+    """Return a copy of a specification with edits applied in order.
+
+    Raises:
+        UnknownName: If an edit names an element that the model lacks.
+        MorphologyError: If an element cannot be changed that way.
+    """
+    result = spec.copy()
+    effective = [edit for edit in edits if edit.amount > 0.0]
+    if not effective:
+        return result
+    make_explicit(result)
+    with carried(result) as keyframes:
+        for edit in effective:
+            edit.require_effect(result)
+            edit.apply(result)
+            edit.follow_in_keyframes(result, keyframes)
+    return result
+
+
+def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjModel:
+    """Compile a copy of a specification with edits applied in order.
+
+    Raises:
+        UnknownName: If an edit names an element that the model lacks.
+        MorphologyError: If an element cannot be changed that way.
+        BrokenModel: If MuJoCo does not compile the result.
+    """
+    body = tuple(edits)
+    try:
+        model = reshape(spec, body).compile()
+    except (ValueError, mujoco.FatalError) as error:
+        if isinstance(error, ShapechangerError):
+            raise
+        text = f"MuJoCo does not compile the body {to_json(body)}: {reason_of(error)}."
+        raise BrokenModel(text) from error
+    if mujoco.__version__ == _WRONG_SPARSE and mujoco.mj_isSparse(model):
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    return model
+
+
+def reason_of(error: BaseException) -> str:
+    """Return the message of an error of MuJoCo, which may have several lines, for a sentence."""
+    lines = [" ".join(line.split()) for line in str(error).splitlines()]
+    return "; ".join(filter(None, lines)).removeprefix("Error: ").removesuffix(".")
+
 
 BodyLike = str | Edit | Iterable[Edit]
 """A body as users give it: its name, edits as JSON, one edit, or several."""
 
 Split = Literal["train", "interpolation", "extrapolation", "composition"]
 """Splits of a family: one for training, three for evaluation."""
-
-# Share of the training bodies that have one of the family's parts.
-_WITH_PART: Final = 0.5
 
 
 @dataclass(frozen=True)
@@ -102,11 +270,13 @@ class Family:
             MorphologyError: If `value` is not a valid body.
         """
         if isinstance(value, str) and not value.lstrip().startswith(("[", "{")):
-            named = {**self.bodies, **self.published}
-            if value not in named:
-                raise UnknownName(f"body of the family {self.name}", value, named)
-            return as_body(named[value])
+            return as_body(self._named("body", value, {**self.bodies, **self.published}))
         return as_body(value)
+
+    def _named(self, kind: str, name: str, known: Mapping[str, Any]) -> Any:
+        if name not in known:
+            raise UnknownName(f"{kind} of the family {self.name}", name, known)
+        return known[name]
 
     def body_at(self, values: Mapping[str, float], parts: Mapping[str, str] | None = None) -> Body:
         """Return the body at some values of the family's axes, by their names; the others are 1.
@@ -121,16 +291,10 @@ class Family:
         """
         edits: list[Edit] = []
         for place, part in (parts or {}).items():
-            if place not in self.parts:
-                raise UnknownName(f"place of the family {self.name}", place, self.parts)
-            if part not in self.parts[place]:
-                raise UnknownName(f"part of {place}", part, self.parts[place])
-            edits += self.parts[place][part]
+            edits += self._named(f"part of {place}", part, self._named("place", place, self.parts))
         axes = {axis.name: axis for axis in self.axes}
         for name, value in values.items():
-            if name not in axes:
-                raise UnknownName(f"axis of the family {self.name}", name, axes)
-            axis = axes[name]
+            axis: Axis = self._named("axis", name, axes)
             if not axis.lowest <= value <= axis.highest:  # Also refuses NaN.
                 raise MorphologyError(
                     f"{name} of the family {self.name} lies between {axis.lowest:g} and "
@@ -173,14 +337,12 @@ class Family:
         return [self._draw(rng, split) for _ in range(n)]
 
     def _draw(self, rng: np.random.Generator, split: Split) -> Body:
-        """Draw one body."""
-        places: list[str] = list(self.parts)
+        places = list(self.parts)
         if split == "composition":
             count = int(rng.integers(2, len(places) + 1))
         else:
             count = int(rng.uniform() < _WITH_PART) if places else 0
-        numbers: list[int] = sorted(rng.permutation(len(places))[:count].tolist())
-        chosen = [places[i] for i in numbers]
+        chosen = [places[i] for i in sorted(rng.permutation(len(places))[:count].tolist())]
         parts = {place: str(rng.choice(list(self.parts[place]))) for place in chosen}
         far = split == "extrapolation"
         while True:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.certificate.numbers import kinds_of
-from shapechanger.morphology.spec.closing import (
+from shapechanger.morphology.spec.carried import (
     CLOSED,
     SINGULAR,
     close,

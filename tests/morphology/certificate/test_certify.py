@@ -15,7 +15,7 @@ import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Edit, Friction, Mass
-from shapechanger.morphology.certificate.certify import certify
+from shapechanger.morphology.certificate import certify
 from tests.morphology.scenes import ASSETS
 from tests.morphology.swing import Swing
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shapechanger.layout import Feature, Layout
-from shapechanger.morphology.certificate.certify import certify, compare_rollouts, matched_commands
+from shapechanger.morphology.certificate import certify, compare_rollouts, matched_commands
 from tests.morphology.swing import Broken, Dictionary, Longer, Noisy, Swing, Wrapper
 
 

@@ -12,7 +12,7 @@ from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
     AddLimb,
 )
-from shapechanger.morphology.spec.grafting import copy_element
+from shapechanger.morphology.spec import copy_element
 from tests.morphology.models import (
     arm,
     built,

@@ -110,7 +110,7 @@ _REFUSED: list[tuple[mujoco.MjSpec, Edit, str]] = [
     (
         arm(_equal('<joint joint1="lower" joint2="upper" polycoef="0 3 0 0 0"/>')),
         Lock("upper", 0.5),
-        "leave the coupling of 'lower' open by .* no position of its joints within their",
+        "coupling of 'lower' open by .* no position of its joints within their",
     ),
     (
         arm(lower=_PLATE),

@@ -13,8 +13,7 @@ import torch
 import shapechanger
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
-from shapechanger.morphology import JointRange
-from shapechanger.morphology.body import to_json
+from shapechanger.morphology import JointRange, to_json
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.export import export_limbs
 from shapechanger.transfer.learners import ignore

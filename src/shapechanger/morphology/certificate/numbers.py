@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.spec import unique_namer
+from shapechanger.morphology.spec.references import COUPLINGS, TARGETS, WRAPS
 
 Values = tuple[float | str, ...]
 Numbers = dict[str, dict[str, dict[str, Values]]]
@@ -44,6 +45,7 @@ _O: Final = mujoco.mjtObj
 _J: Final = mujoco.mjtJoint
 _T: Final = mujoco.mjtTrn
 _W: Final = mujoco.mjtWrap
+_E: Final = mujoco.mjtEq
 _DISABLE: Final = mujoco.mjtDisableBit
 _ENABLE: Final = mujoco.mjtEnableBit
 
@@ -96,24 +98,21 @@ KINDS: Final = {
 
 def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
     """Return the kinds of the elements that indices of several kinds are of; "" for none."""
-    targets = {_T.mjTRN_TENDON: "tendons", _T.mjTRN_BODY: "bodies", _T.mjTRN_SITE: "sites"}
-    targets[_T.mjTRN_SLIDERCRANK] = "sites"
-    wrapped = {_W.mjWRAP_JOINT: "joints", _W.mjWRAP_SITE: "sites", _W.mjWRAP_PULLEY: ""}
-    tied = {mujoco.mjtEq.mjEQ_JOINT: "joints", mujoco.mjtEq.mjEQ_TENDON: "tendons"}
-    by_type = {kind.value: name for name, (_, _, kind) in KINDS.items()}
-    by_type[_O.mjOBJ_XBODY.value] = "bodies"
+    section = {kind: name for name, (_, _, kind) in KINDS.items()} | {_O.mjOBJ_XBODY: "bodies"}
     ends = zip(m.actuator_trntype.tolist(), m.actuator_trnid[:, 1].tolist(), strict=True)
     ties = zip(m.eq_type.tolist(), m.eq_objtype.tolist(), strict=True)
     return {
         # `so3` drives a ball joint, or a site with its reference site.
         "actuator_target_kinds": [
-            "sites" if kind == _T.mjTRN_SO3 and end >= 0 else targets.get(_T(kind), "joints")
+            "sites"
+            if kind == _T.mjTRN_SO3 and end >= 0
+            else section[TARGETS.get(_T(kind), _O.mjOBJ_JOINT)]
             for kind, end in ends
         ],
-        "wrap_kinds": [wrapped.get(_W(kind), "geoms") for kind in m.wrap_type.tolist()],
-        "eq_kinds": [
-            tied.get(mujoco.mjtEq(kind)) or by_type.get(on, "flexes") for kind, on in ties
+        "wrap_kinds": [
+            section[WRAPS[_W(kind)]] if _W(kind) in WRAPS else "" for kind in m.wrap_type.tolist()
         ],
+        "eq_kinds": [section.get(COUPLINGS.get(_E(kind), _O(on)), "flexes") for kind, on in ties],
     }
 
 
@@ -322,8 +321,6 @@ def sensed_values(model: mujoco.MjModel, *, drawn: bool) -> list[Values]:
 
 
 class _Reader:
-    """Reads the arrays of a model by the table."""
-
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._made: dict[str, Any] = contact_arrays(model) | made_arrays(model)
@@ -331,7 +328,6 @@ class _Reader:
         self.kept = self._relevant()
 
     def section(self, section: str) -> dict[str, dict[str, Values]]:
-        """Return the elements of a section that count, with their quantities."""
         names = self.names.get(section, [])
         rows = self.rows(MOVED[section], len(names))
         kept = self.kept.get(section, [True] * len(names))
@@ -339,7 +335,6 @@ class _Reader:
         return found if section in _IN_ORDER else dict(sorted(found.items()))
 
     def rows(self, fields: dict[str, Field], count: int) -> list[dict[str, Values]]:
-        """Return the quantities of each of so many elements."""
         rows: list[dict[str, Values]] = [{} for _ in range(count)]
         for quantity, field in fields.items() if count else ():
             acts = field.where and self._split(field.where, self.array(field.where))
@@ -358,7 +353,6 @@ class _Reader:
         return np.frombuffer(bytes(values), np.uint8) if name == "plugin_attr" else values
 
     def _split(self, array: str, values: Any) -> list[Any]:
-        """Return the rows of an array that belong to each element."""
         first = "jnt_dofadr" if array.startswith("dof_") else TABLE["first_rows"].get(array, "")
         return np.split(values, getattr(self._model, first)[1:]) if first else list(values)
 
@@ -383,7 +377,6 @@ class _Reader:
         return values
 
     def _indices(self, field: Field) -> list[tuple[str, int]]:
-        """Return the kind and the index of each element that an array names."""
         values: list[int] = self.array(field.array).tolist()
         kinds: list[str] = self._made.get(field.of, [field.of] * len(values))
         return list(zip(kinds, values, strict=True))

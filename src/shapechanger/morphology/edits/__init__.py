@@ -1,7 +1,7 @@
 """The edits: one class for each change to a model, a frozen value that converts to JSON.
 
 Every edit has an `amount`, the share of the change that is made. It is 1 except between two
-bodies, where it makes the path continuous (see `shapechanger.morphology.body.interpolate`). Every
+bodies, where it makes the path continuous (see `shapechanger.morphology.interpolate`). Every
 module of this folder is imported, so a file with an edit needs to be named nowhere else.
 """
 

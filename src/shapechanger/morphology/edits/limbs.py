@@ -25,12 +25,15 @@ from shapechanger.morphology.edits import (
 from shapechanger.morphology.edits.values import scale_strength
 from shapechanger.morphology.spec import (
     LEAST_MASS,
+    copy_element,
+    copy_limb,
     geometry,
-    grafting,
+    move,
     references,
     require_free_name,
     select,
     select_limbs,
+    share_contacts,
 )
 from shapechanger.morphology.spec.carried import Keyframes
 
@@ -291,12 +294,12 @@ class Split(Edit, frozen=True):
         beyond = [spec.geom(name) for name, piece in pieces.items() if not piece.share]
         part = _add_segment(spec, body, self, plane.place, self.amount)
         for point in (*beyond, *plane.points, *plane.children):
-            geometry.move_by(grafting.move(spec, point, part), -plane.place)
+            geometry.move_by(move(spec, point, part), -plane.place)
         for name, half in halves.items():
             geom = spec.geom(name)
-            copy = grafting.copy_element(spec, geom, part, half)
+            copy = copy_element(spec, geom, part, half)
             self._divide(geom, copy, pieces[name], plane.place)
-        grafting.share_contacts(spec, body, part, halves)
+        share_contacts(spec, body, part, halves)
 
     def _divide(self, geom: Any, copy: Any, piece: geometry.NearPart, place: np.ndarray) -> None:
         """Divide a geom: it becomes the nearer half, a copy on the other body the farther one."""
@@ -355,7 +358,7 @@ class AddSegment(Edit, frozen=True):
         geometry.require_geometry(spec, body)
         part = _add_segment(spec, body, self, geometry.far_end(body), 1.0)
         model_geom = next(geom for geom in body.geoms if geom.type in geometry.LONG)
-        geom = grafting.copy_element(spec, model_geom, part, f"{self.name}_geom")
+        geom = copy_element(spec, model_geom, part, f"{self.name}_geom")
         geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
         if not math.isnan(geom.mass):
             geom.density, geom.mass = geom.mass / geometry.volume(model_geom), math.nan
@@ -385,7 +388,7 @@ class AddLimb(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add the limb."""
         limb = next(select_limbs(spec, self.like, "copied"))
-        copy = grafting.copy_limb(spec, limb, self.suffix, self.angle)
+        copy = copy_limb(spec, limb, self.suffix, self.angle)
         if self.size != 1.0:
             _resize_limb(spec, copy, self.size)
         if self.amount != 1.0:

@@ -1,9 +1,8 @@
 """Data that refer to positions or order: keyframes, pins of loops, paths of tendons.
 
-Edits see none of the keyframes, and pins as sites. MuJoCo states the pin of a loop in the frame of
-its first body, and takes its place on the second from the model's own pose. So each pin is two
-sites while edits are applied; then the own pose is changed until what was closed in it is closed
-again, and pins and keyframes are written back.
+Edits see none of the keyframes, and each pin as two sites. MuJoCo states a pin in the frame of its
+first body, and takes its place on the second from the model's own pose. After the edits that pose
+is changed until what was closed in it is closed again; pins and keyframes are written back.
 """
 
 from __future__ import annotations
@@ -15,10 +14,10 @@ from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec import compiled, unique_namer
-from shapechanger.morphology.spec.closing import CLOSED, close, equality_rows
 from shapechanger.morphology.spec.geometry import (
     OPPOSITE,
     UPRIGHT,
@@ -36,7 +35,6 @@ _J: Final = mujoco.mjtJoint
 _O: Final = mujoco.mjtObj
 _W: Final = mujoco.mjtWrap
 _D: Final = mujoco.mjtDisableBit
-_WITHOUT: Final = _D.mjDSBL_CONTACT | _D.mjDSBL_LIMIT | _D.mjDSBL_FRICTIONLOSS
 _MOST_STEPS: Final = 200
 # Fields of a keyframe, and of the data that they fill.
 _FIELDS: Final = {
@@ -49,13 +47,28 @@ _WITHIN: Final = 1e-6
 _TOGETHER: Final = 1e-8
 # A joint that moves less has not moved, rad or m.
 _STILL: Final = 1e-12
+CLOSED: Final = 1e-9
+"""Residual of an equality that is closed, m or rad; above the rounding of a compiled model."""
+SINGULAR: Final = 1e-6
+"""Singular values below this share of the largest belong to motions that do not close a loop."""
+
+# Equalities that a pose can close, by Gauss-Newton steps on MuJoCo's own Jacobian.
+_SOLVED: Final = [
+    int(kind) for kind in (_E.mjEQ_CONNECT, _E.mjEQ_WELD, _E.mjEQ_JOINT, _E.mjEQ_TENDON)
+]
+# A longer step, rad or m, can jump to another way to assemble the loop.
+_LONGEST_STEP: Final = 0.2
+_UNLIMITED: Final = np.array([[-np.inf], [np.inf]])
 
 
 @contextmanager
 def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
     """Take keyframes and pins out of the way of edits, yield the keyframes, and write all back."""
-    loops = any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities)
-    if not (spec.keys or spec.tendons or loops):
+
+    def loops() -> bool:
+        return any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities)
+
+    if not (spec.keys or spec.tendons or loops()):
         yield Keyframes(spec, None)
         return
     for i, tendon in enumerate(spec.tendons):
@@ -63,13 +76,13 @@ def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
     model = compiled(spec)
     keyframes = Keyframes(spec, model)
     tendons, torn = _tendons(model), set[Element]()
-    if loops:
+    if loops():
         _mark_pins(spec, model)
         marked = compiled(spec)
         residuals = _residuals(spec, marked, _posed(marked))
         torn = {key for key, residual in residuals.items() if residual > CLOSED}
     yield keyframes
-    if any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities):
+    if loops():
         _unmark_pins(spec, _close_loops(spec, compiled(spec), torn, keyframes))
     if spec.tendons:
         _follow_tendons(spec, tendons)
@@ -124,7 +137,7 @@ class Keyframes:
 
 
 def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[tuple[str, str], Array]:
-    """Return the elements' numbers in `data`, by field of a keyframe and name of the element."""
+    # By field of a keyframe and name of the element; views of `data`.
     found: dict[tuple[str, str], Array] = {}
     for joint in (data.joint(i) for i in range(model.njnt)):
         found |= {("qpos", joint.name): joint.qpos, ("qvel", joint.name): joint.qvel}
@@ -138,15 +151,12 @@ def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[tuple[str, str]
 
 
 class _Tendon(NamedTuple):
-    """A tendon in the model's own pose."""
-
-    length: float  # m, or of a fixed one the sum of its joints.
+    length: float  # In the model's own pose, m, or of a fixed one the sum of its joints.
     fits: bool  # Whether the length is within its limits, if it has any.
     inside: list[bool]  # For each geom that it passes with a side site, whether that is inside.
 
 
 def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
-    """Return the tendons of a model in its own pose, keyed by name."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     found: dict[str, _Tendon] = {}
@@ -234,15 +244,13 @@ def _close_loops(
     still = (kinds == int(_J.mjJNT_FREE)) | ((kinds == int(_J.mjJNT_BALL)) & measured)
     if close(model, data, ~still[model.dof_jntid], _MOST_STEPS) > CLOSED:
         (_, name), gap = max(_residuals(spec, model, data).items(), key=lambda item: item[1])
-        equality = next(e for e in spec.equalities if e.name1 == name)
-        names = [equality.name1, equality.name2]
+        ends = next([e.name1, e.name2] for e in spec.equalities if e.name1 == name)
         if name.startswith(MARK):
-            names = [spec.site(end).parent.name for end in names]
-        loop = f"the {'coupling' if equality.type in COUPLINGS else 'pin'} of "
+            ends = [spec.site(end).parent.name for end in ends]
         raise MorphologyError(
-            f"The edits leave {loop}{' and '.join(repr(end) for end in names if end)} open by "
-            f"{gap:.3g} m or rad, and no position of its joints within their limits closes it: "
-            "change its other links or joints too."
+            f"The edits leave the pin or coupling of {' and '.join(map(repr, filter(None, ends)))} "
+            f"open by {gap:.3g} m or rad, and no position of its joints within their limits closes "
+            "it: change its other links or joints too."
         )
     moved = False
     changes: dict[Element, float] = {}
@@ -269,7 +277,6 @@ def _close_loops(
 
 
 def _unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
-    """State the pins in the frames of their bodies again, and delete their sites."""
     free = unique_namer(site.name for site in spec.sites)
     for equality in spec.equalities:
         if equality.type not in PINS or not equality.name1.startswith(MARK):
@@ -299,7 +306,7 @@ def _unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
 
 def _posed(model: mujoco.MjModel) -> mujoco.MjData:
     """Return data in the model's own pose, with the rows of its equalities alone."""
-    model.opt.disableflags |= int(_WITHOUT)
+    model.opt.disableflags |= _D.mjDSBL_CONTACT | _D.mjDSBL_LIMIT | _D.mjDSBL_FRICTIONLOSS
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
@@ -307,7 +314,7 @@ def _posed(model: mujoco.MjModel) -> mujoco.MjData:
 
 
 def _keys(spec: mujoco.MjSpec) -> list[Element]:
-    """Return a key of each equality that edits keep: its kind and the first that it names."""
+    # Edits keep the kind of an equality and the first that it names.
     return [(COUPLINGS.get(e.type, e.objtype), e.name1) for e in spec.equalities]
 
 
@@ -336,3 +343,55 @@ def _shift_coupling(equality: mujoco.MjsEquality, changes: dict[Element, float])
         data[:5] = [polynomial.deriv(n)(by_leader) / math.factorial(n) for n in range(5)]
         data[0] -= by_follower
         equality.data = data
+
+
+def equality_rows(
+    model: mujoco.MjModel, data: mujoco.MjData
+) -> tuple[NDArray[np.int32], Array, Array]:
+    """Return the equality, the violation and the Jacobian (n, nv) of each row of equalities.
+
+    The data have gone through `mj_fwdPosition`.
+    """
+    ids = data.efc_id[: int(data.ne)]
+    rows = np.flatnonzero(np.isin(model.eq_type[ids], _SOLVED))
+    dense = np.zeros((int(data.nefc), model.nv))
+    if mujoco.mj_isSparse(model):
+        mujoco.mju_sparse2dense(
+            dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+        )
+    else:
+        dense[:] = data.efc_J.reshape(dense.shape)
+    return ids[rows], data.efc_pos[rows], dense[rows]
+
+
+def close(
+    model: mujoco.MjModel, data: mujoco.MjData, movable: NDArray[np.bool_], most_steps: int
+) -> float:
+    """Move the pose in `data` to the nearest in which the equalities hold.
+
+    Only the `movable` degrees of freedom (nv,) move; hinges and slides stay inside their limits, or
+    get no farther outside. The largest violation that is left is returned, m or rad.
+    """
+    scalar, at_limit = np.flatnonzero(model.jnt_type > int(_J.mjJNT_BALL)), np.zeros(model.nv, bool)
+    places, dofs = model.jnt_qposadr[scalar], model.jnt_dofadr[scalar]
+    low, high = np.where(model.jnt_limited[scalar], model.jnt_range[scalar].T, _UNLIMITED)
+    low, high = np.minimum(low, data.qpos[places]), np.maximum(high, data.qpos[places])
+    for _ in range(most_steps):
+        _, gaps, jacobian = equality_rows(model, data)
+        if largest(gaps) <= CLOSED:
+            break
+        step, moving = np.zeros(model.nv), movable & ~at_limit
+        step[moving] = -np.linalg.pinv(jacobian[:, moving], SINGULAR) @ gaps
+        step *= min(1.0, _LONGEST_STEP / max(largest(step), _LONGEST_STEP))
+        mujoco.mj_integratePos(model, data.qpos, step, 1.0)
+        clipped = np.clip(data.qpos[places], low, high)
+        # A joint at its limit is left out of the next step, which the others must make.
+        at_limit[dofs] = clipped != data.qpos[places]
+        data.qpos[places] = clipped
+        mujoco.mj_fwdPosition(model, data)
+    return largest(equality_rows(model, data)[1])
+
+
+def largest(numbers: Array) -> float:
+    """Return the largest absolute value, 0 of none."""
+    return float(np.abs(numbers).max(initial=0.0))

@@ -33,33 +33,25 @@ COUPLINGS: Final = {_E.mjEQ_JOINT: _JOINT, _E.mjEQ_TENDON: _O.mjOBJ_TENDON}
 MARK: Final = "pin~"
 """Prefix of the sites that stand for the ends of loops while edits are applied."""
 
-_TARGETS: Final = {
+TARGETS: Final = {
     **dict.fromkeys(OF_JOINTS, _JOINT),
     **dict.fromkeys((_T.mjTRN_SITE, _T.mjTRN_SLIDERCRANK), _SITE),
     _T.mjTRN_TENDON: _O.mjOBJ_TENDON,
     _T.mjTRN_BODY: _BODY,
 }
-_WRAPS: Final = {
+WRAPS: Final = {
     **{_W.mjWRAP_JOINT: _JOINT, _W.mjWRAP_SITE: _SITE},
     **dict.fromkeys((_W.mjWRAP_SPHERE, _W.mjWRAP_CYLINDER), _GEOM),
 }
 
 
-def _end_of(equality: Any) -> mujoco.mjtObj | None:
-    return equality.objtype if equality.type in PINS else COUPLINGS.get(equality.type)
-
-
-def _target_of(actuator: Any) -> mujoco.mjtObj | None:
-    return _TARGETS.get(actuator.trntype)
-
-
 # Lists of elements that name others, their fields with names, and the kind of the named elements
 # or a function that returns it; a tuple has one kind for each name.
 _HOLDERS: Final[tuple[tuple[str, str, Any], ...]] = (
-    ("equalities", "name1 name2", _end_of),
+    ("equalities", "name1 name2", lambda e: e.objtype if e.type in PINS else COUPLINGS.get(e.type)),
     ("excludes", "bodyname1 bodyname2", _BODY),
     ("pairs", "geomname1 geomname2", _GEOM),
-    ("actuators", "target", _target_of),
+    ("actuators", "target", lambda a: TARGETS.get(a.trntype)),
     ("actuators", "refsite slidersite", _SITE),
     ("sensors", "objname", attrgetter("objtype")),
     ("sensors", "refname", attrgetter("reftype")),
@@ -73,8 +65,6 @@ _HOLDERS: Final[tuple[tuple[str, str, Any], ...]] = (
 _OF_ALL_GEOMS: Final = (
     *(_S.mjSENS_GEOMDIST, _S.mjSENS_GEOMNORMAL, _S.mjSENS_GEOMFROMTO, _S.mjSENS_CONTACT),
 )
-# Two positions of one joint that differ by less are the same, rad or m.
-_SAME: Final = 1e-6
 
 
 class Mention(NamedTuple):
@@ -90,10 +80,9 @@ class Mention(NamedTuple):
         return kind_of(self.holder)
 
     def __str__(self) -> str:
-        if self.holder.name:
-            return f"the {self.kind} {self.holder.name!r}"
         name = self.element[1]
-        return f"the {self.kind}" if name.startswith(MARK) else f"the {self.kind} of {name!r}"
+        of = "" if name.startswith(MARK) else f" of {name!r}"
+        return f"the {self.kind}" + (f" {self.holder.name!r}" if self.holder.name else of)
 
 
 def mentions(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
@@ -102,9 +91,7 @@ def mentions(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     `kinds` such as "actuator" are the holders', by default all.
     """
     found = [
-        Mention(tendon, "path", element)
-        for tendon in spec.tendons
-        for element in path_elements(tendon)
+        Mention(tendon, "path", key) for tendon in spec.tendons for key in path_elements(tendon)
     ]
     for elements, fields, kind in _HOLDERS:
         for holder in getattr(spec, elements):
@@ -112,14 +99,14 @@ def mentions(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
             for field in fields.split():
                 names = getattr(holder, field)
                 names = [names] if isinstance(names, str) else list(names)
-                each: list[Any] = list(of) if kind_of(holder) == "tuple" else [of] * len(names)
+                each: list[Any] = list(of) if elements == "tuples" else [of] * len(names)
                 keys = ((_plain(k), name) for k, name in zip(each, names, strict=True))
                 found += [Mention(holder, field, key) for key in keys if key[1]]
     return [mention for mention in found if not kinds or mention.kind in kinds]
 
 
 def _plain(kind: Any) -> mujoco.mjtObj:
-    """Return a body for either frame of a body, which sensors distinguish."""
+    # Sensors distinguish the two frames of a body.
     return _BODY if kind == _O.mjOBJ_XBODY else _O(kind or 0)
 
 
@@ -160,8 +147,8 @@ def path_elements(tendon: mujoco.MjsTendon) -> list[Element]:
     """Return the elements that a tendon passes, side sites included, in order."""
     found: list[Element] = []
     for wrap in path_of(tendon):
-        if wrap.type in _WRAPS:
-            found.append((_WRAPS[wrap.type], wrap.target.name))
+        if wrap.type in WRAPS:
+            found.append((WRAPS[wrap.type], wrap.target.name))
         if side := wrap.sidesite:
             found.append((_SITE, side.name))
     return found
@@ -184,22 +171,23 @@ def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Elem
 
 def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
     """Return whether a tendon acts or is used; the humanoid's do neither."""
-    acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss
-    if is_limited(tendon) or acts or tendon.armature:
-        return True
-    return any(each.element == key_of(tendon) for each in mentions(spec))
+    forces = (tendon.stiffness, tendon.damping, tendon.frictionloss, tendon.armature)
+    used = any(each.element == key_of(tendon) for each in mentions(spec))
+    return is_limited(tendon) or any(map(np.any, forces)) or used
 
 
 def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool = True) -> None:
     """Remove the skins over bodies that change, without effect, and refuse parts of a flex."""
-    found = [each for each in mentions(spec, "flex", "skin") if each.element in touched]
-    for mention in found:
-        if mention.kind == "flex":
-            raise MorphologyError(
-                f"{mention.element[1]!r} carries a part of {mention}, which would not follow: "
-                "remove the flex first."
-            )
-    for skin in {each.holder.name: each.holder for each in found if skins}.values():
+    gone: dict[str, Any] = {}
+    for mention in mentions(spec, "flex", "skin"):
+        if mention.element in touched:
+            if mention.kind == "flex":
+                raise MorphologyError(
+                    f"{mention.element[1]!r} carries a part of {mention}, which would not follow: "
+                    "remove the flex first."
+                )
+            gone[mention.holder.name] = mention.holder
+    for skin in gone.values() if skins else ():
         spec.delete(skin)
 
 
@@ -325,7 +313,7 @@ def _hold(spec: mujoco.MjSpec, kind: mujoco.mjtEq, name: str, locked: float) -> 
             )
         elif slope:
             held, by = leader, (locked - polynomial[0]) / slope
-        elif abs(locked - polynomial[0]) > _SAME:
+        elif abs(locked - polynomial[0]) > 1e-6:  # rad or m
             raise MorphologyError(
                 f"{name!r} is held {polynomial[0]:.4g} from its reference by a coupling, so it "
                 f"cannot be locked {locked:.4g} from it."
