@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -79,10 +81,10 @@ class Swing:
 
 
 class Wrapper:
-    """Minimal wrapper in the style of Gymnasium."""
+    """Minimal wrapper in the style of Gymnasium, which changes what is observed."""
 
-    def __init__(self, env: Any) -> None:
-        self.env = env
+    def __init__(self, env: Any, sensed: Callable[[Any], Any] = lambda seen: seen) -> None:
+        self.env, self._sensed = env, sensed
 
     @property
     def unwrapped(self) -> Any:
@@ -91,48 +93,32 @@ class Wrapper:
 
     def reset(self, *, seed: int | None = None) -> tuple[Any, dict[str, Any]]:
         observation, info = self.env.reset(seed=seed)
-        return self.sensed(observation), info
+        return self._sensed(observation), info
 
     def step(self, action: Any, /) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         observation, *rest = self.env.step(action)
-        return (self.sensed(observation), *rest)
-
-    def sensed(self, observation: Any) -> Any:
-        """Return the modified observation."""
-        return observation
+        return (self._sensed(observation), *rest)
 
 
-class Noisy(Wrapper):
-    """Wrapper that adds noise to the observation, from its own generator."""
-
-    def __init__(self, env: Any) -> None:
-        super().__init__(env)
-        self._random = np.random.default_rng(7)
-
-    def sensed(self, observation: Any) -> Any:
-        """Add noise."""
-        return observation + self._random.normal(scale=0.01, size=np.shape(observation))
+def noisy(env: Any) -> Wrapper:
+    random = np.random.default_rng(7)
+    return Wrapper(env, lambda seen: seen + random.normal(scale=0.01, size=np.shape(seen)))
 
 
-class Dictionary(Wrapper):
-    """Wrapper that splits the observation into a dictionary."""
-
-    def sensed(self, observation: Any) -> Any:
-        """Return velocity and angle."""
-        return {"velocity": observation[1:], "angle": observation[:1]}
+def dictionary(env: Any) -> Wrapper:
+    return Wrapper(env, lambda seen: {"velocity": seen[1:], "angle": seen[:1]})
 
 
-class Longer(Wrapper):
-    """Wrapper that appends a number to the observation, without a layout for it."""
-
-    def sensed(self, observation: Any) -> Any:
-        """Append a number."""
-        return np.append(observation, 1.0)
+def longer(env: Any) -> Wrapper:
+    """Return an env with one more number, without a layout for it."""
+    return Wrapper(env, lambda seen: np.append(seen, 1.0))
 
 
-class Broken(Wrapper):
-    """Wrapper that makes the first number of the observation NaN."""
+def broken(env: Any) -> Wrapper:
+    return Wrapper(env, lambda seen: np.concatenate([[np.nan], seen[1:]]))
 
-    def sensed(self, observation: Any) -> Any:
-        """Replace the first number by NaN."""
-        return np.concatenate([[np.nan], observation[1:]])
+
+def late(env: Any, after: int, offset: float) -> Wrapper:
+    """Return an env that adds to its observations after some of them."""
+    count = itertools.count()
+    return Wrapper(env, lambda seen: seen + (offset if next(count) >= after else 0.0))

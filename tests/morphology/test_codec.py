@@ -44,8 +44,7 @@ def test_a_body_round_trips_through_json() -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["", "{", "stretch", "[1,", b"\xff\xfe\x00", b"[\xc3\x28]", "[" * 100_000],
+    "text", ["", "{", "stretch", "[1,", b"\xff\xfe\x00", b"[\xc3\x28]", "[" * 100_000]
 )
 def test_invalid_json_is_refused(text: str | bytes) -> None:
     with pytest.raises(MorphologyError, match="A body must be a JSON list of edits: "):

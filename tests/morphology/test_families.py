@@ -11,15 +11,7 @@ import pytest
 from shapechanger.envs.ant import ANT
 from shapechanger.envs.runners import HOPPER
 from shapechanger.errors import MorphologyError, UnknownName
-from shapechanger.morphology import (
-    AddLimb,
-    AddSegment,
-    Body,
-    Cut,
-    Stretch,
-    compile_body,
-    to_json,
-)
+from shapechanger.morphology import AddLimb, AddSegment, Body, Cut, Stretch, compile_body, to_json
 from shapechanger.morphology.certificate import certify
 from shapechanger.morphology.families import Family
 from tests.morphology.models import LEG
@@ -104,7 +96,7 @@ def test_what_cannot_be_drawn_is_refused() -> None:
         ANT.body_at({"frictoin": 1.0})
     with pytest.raises(UnknownName, match="place of the family Ant matches 'leg 5'"):
         ANT.body_at({}, {"leg 5": "stump"})
-    with pytest.raises(UnknownName, match="part of leg 1 matches 'wheel'"):
+    with pytest.raises(UnknownName, match=r"part of leg 1 .* matches 'wheel'"):
         ANT.body_at({}, {"leg 1": "wheel"})
     with pytest.raises(UnknownName, match="split matches 'test'"):
         ANT.sample(1, 0, cast("Any", "test"))

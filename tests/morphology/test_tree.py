@@ -1,4 +1,4 @@
-"""The kinematic tree of bodies, and the numbers that describe it."""
+"""The robot among a model's bodies, its kinematic tree, and the numbers that describe it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,17 @@ import numpy as np
 import pytest
 
 from shapechanger.envs.ant import ANT
-from shapechanger.morphology import Body, Cut, Gear, Mass, Stretch, compile_body
-from shapechanger.morphology.pose import start_pose
+from shapechanger.morphology import Body, Cut, Gear, Mass, Stretch, TotalMass, compile_body, reshape
+from shapechanger.morphology.pose import (
+    StartRules,
+    floor_height,
+    moved_trees,
+    robot_bodies,
+    standing_height,
+    start_pose,
+    travelling_body,
+    trunk_lift,
+)
 from shapechanger.morphology.tree import LIMB_NUMBERS, TRUNK_NUMBERS, Tree, tree_of
 
 _ARM = """
@@ -189,3 +198,187 @@ def test_the_strength_of_a_tendon_is_a_torque(actuators: str, torque: float) -> 
     model = mujoco.MjModel.from_xml_string(_TENDONS.format(actuators))
     strength = _number(tree_of(model, np.zeros(model.nq)), "wrist", "strength")
     assert strength == pytest.approx(math.log10(1.0 + torque) / 2.0)
+
+
+# Objects come first, so that nothing is right by the order of the file.
+_SCENE = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="9 9 1"/>
+    <body name="ball" pos="3 0 .1"><freejoint name="ball"/><geom size=".1" mass="5"/></body>
+    <body name="door" pos="5 0 1">
+      <joint name="door" axis="0 0 1" range="0 90" damping="1"/>
+      <geom type="box" size=".5 .02 1" mass="20"/><site name="knob"/>
+    </body>
+    <body name="table"><geom type="box" size=".5 .5 .01" pos="-3 0 .5" mass="9"/></body>
+    <body name="base" pos="0 0 .5">
+      <geom size=".05" mass="2"/>
+      <body name="arm" pos="0 0 .1">
+        <joint name="arm" axis="0 1 0" range="-60 60"/><geom size=".03" pos="0 0 .2" mass="1"/>
+        <site name="tip" pos="0 0 .2"/><site name="crank" pos=".02 0 .2"/>
+      </body>
+    </body>
+  </worldbody>
+  {more}
+</mujoco>
+"""
+_MOVED_BY_JOINT = '<actuator><motor joint="arm" ctrlrange="-1 1"/></actuator>'
+_ROBOT = ["base", "arm"]
+
+
+def _model(more: str) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(_SCENE.format(more=more))
+
+
+def _robot(model: mujoco.MjModel) -> list[str]:
+    return [model.body(i).name for i in np.flatnonzero(robot_bodies(model))]
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        _MOVED_BY_JOINT,
+        '<actuator><motor jointinparent="arm"/></actuator>',
+        '<tendon><fixed name="t"><joint joint="arm" coef="1"/></fixed></tendon>'
+        '<actuator><motor tendon="t"/></actuator>',
+        '<tendon><spatial name="t"><site site="tip"/><site site="crank"/></spatial></tendon>'
+        '<actuator><motor tendon="t"/></actuator>',
+        '<actuator><motor site="tip"/></actuator>',
+        '<actuator><motor cranksite="crank" slidersite="tip" cranklength=".1"/></actuator>',
+        '<actuator><adhesion body="arm" ctrlrange="0 1"/></actuator>',
+        '<actuator><orientation site="tip" refsite="crank" kp="1"/></actuator>',
+    ],
+)
+def test_the_robot_is_what_actuators_move(more: str) -> None:
+    """Through any transmission, with the fixed bodies that carry it, and without objects."""
+    assert _robot(_model(more)) == _ROBOT
+
+
+@pytest.mark.parametrize(
+    ("coupling", "also"),
+    [
+        ('<joint joint1="door" joint2="arm"/>', ["door"]),
+        ('<joint joint1="door" joint2="arm" active="false"/>', []),
+        ('<joint joint1="door"/>', []),
+        ('<connect body1="arm" body2="door" anchor="0 0 0"/>', ["door"]),
+        ('<weld site1="tip" site2="knob"/>', ["door"]),
+        ('<weld body1="ball" body2="door"/>', []),
+        ('<weld body1="ball" body2="door"/><weld body1="door" body2="arm"/>', ["ball", "door"]),
+        ('<tendon tendon1="one" tendon2="other"/>', ["door"]),
+    ],
+)
+def test_what_an_equality_couples_to_the_robot_is_part_of_it(
+    coupling: str, also: list[str]
+) -> None:
+    """As the second finger of a gripper; also by way of another."""
+    tendons = "".join(
+        f'<fixed name="{name}"><joint joint="{joint}" coef="1"/></fixed>'
+        for name, joint in (("one", "arm"), ("other", "door"))
+    )
+    model = _model(f"<tendon>{tendons}</tendon><equality>{coupling}</equality>{_MOVED_BY_JOINT}")
+    assert set(_robot(model)) == {*_ROBOT, *also}
+
+
+def test_a_flex_couples_no_bodies() -> None:
+    cloth = (
+        '<worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" dim="2" '
+        'radius=".01" pos="0 3 1"><edge equality="true"/></flexcomp></worldbody>'
+    )
+    assert _robot(_model(cloth + _MOVED_BY_JOINT)) == _ROBOT
+
+
+def test_without_actuators_everything_is_the_robot() -> None:
+    """As in a description that gets its motors later; the world is no part of it."""
+    assert _robot(_model("")) == ["ball", "door", "base", "arm"]
+
+
+def test_the_trunk_is_the_tree_that_most_actuators_move() -> None:
+    """A free ball is no trunk, and a robot with fewer motors comes second."""
+    assert travelling_body(_model(_MOVED_BY_JOINT)) is None
+    assert trunk_lift(_model(_MOVED_BY_JOINT)) is None
+    model = _model(
+        '<actuator><motor site="tip"/><adhesion body="ball" ctrlrange="0 1"/></actuator>'
+    )
+    assert model.body(travelling_body(model)).name == "ball"
+    assert moved_trees(model)[0] == model.body_treeid[model.body("ball").id]
+    drones = """
+    <mujoco><worldbody>
+      <body name="tug"><freejoint/><geom size=".1"/><site name="tug"/></body>
+      <body name="drone"><freejoint/><geom size=".1"/><site name="left"/><site name="right"/></body>
+    </worldbody><actuator><motor site="tug"/><motor site="left"/><motor site="right"/></actuator>
+    </mujoco>"""
+    model = mujoco.MjModel.from_xml_string(drones)
+    assert model.body(travelling_body(model)).name == "drone"
+
+
+_WALKER = """
+<mujoco>
+  <worldbody>
+    <geom type="plane" size="9 9 1"/>
+    <body name="low" pos="3 0 -.2"><freejoint/><geom size=".5" mass="7"/></body>
+    <body name="flap" pos="4 0 1"><joint name="flap" axis="0 0 1" range="0 1"/>
+      <geom size=".1"/></body>
+    <body name="trunk" pos="0 0 .4"><freejoint/><geom size=".1" mass="2"/>
+      <body name="leg"><joint name="leg" axis="0 1 0" range="0 1"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -.4" size=".05" mass="1"/></body></body>
+  </worldbody>
+  <actuator><motor joint="leg" ctrlrange="-1 1"/></actuator>
+  <compiler angle="radian"/>
+</mujoco>
+"""
+
+
+def test_objects_neither_carry_the_robot_nor_move() -> None:
+    """The standing height, the start, the mass and the limbs count the robot alone."""
+    model = mujoco.MjModel.from_xml_string(_WALKER)
+    rules = StartRules(model)
+    start = start_pose(model)
+    trunk, low, flap = (
+        int(model.joint(int(model.body(name).jntadr[0])).qposadr[0])
+        for name in ("trunk", "low", "flap")
+    )
+    assert start[flap] == 0.0
+    assert start[low + 2] == -0.2
+    leg_only = np.cos(0.1) * 0.4 + 0.05
+    assert start[trunk + 2] == pytest.approx(leg_only)
+    assert standing_height(model, start) == pytest.approx(leg_only)
+    drawn = start + 0.3
+    feasible = rules.feasible(drawn, mujoco.MjData(model))
+    np.testing.assert_array_equal(feasible[[low, flap]], drawn[[low, flap]])
+    assert rules.robot_places.sum() == 8
+    assert rules.robot_dofs.sum() == 7
+    assert [limb.joint for limb in tree_of(model, start).limbs] == ["leg"]
+    assert tree_of(model, start).trunk == ("trunk",)
+    spec = mujoco.MjSpec.from_string(_WALKER)
+    heavier = reshape(spec, [TotalMass(6.0)]).compile()
+    assert heavier.body("trunk").mass[0] + heavier.body("leg").mass[0] == pytest.approx(6.0)
+    assert heavier.body("low").mass[0] == pytest.approx(7.0)
+
+
+def test_a_joint_that_its_damping_locks_is_at_rest() -> None:
+    """MuJoCo diverges unless it is."""
+    locked = _WALKER.replace('name="leg" axis', 'name="leg" damping="1e11" axis')
+    rules = StartRules(mujoco.MjModel.from_xml_string(locked))
+    assert rules.robot_dofs.sum() == 6
+
+
+@pytest.mark.parametrize(("floor", "height"), [('pos="0 0 -.7"', -0.7), ('contype="0"', 0.0)])
+def test_the_floor_need_not_be_at_zero(floor: str, height: float) -> None:
+    """Without one that the robot can touch it counts as 0."""
+    text = _WALKER.replace('size="9 9 1"/>', f'size="9 9 1" {floor} conaffinity="0"/>')
+    text = text.replace('conaffinity="0"', "") if "pos" in floor else text
+    model = mujoco.MjModel.from_xml_string(text)
+    assert floor_height(model, start_pose(model)) == pytest.approx(height)
+
+
+def test_large_models_have_dense_jacobians_on_mujoco_4_0_0() -> None:
+    """Newton's solver factorises a wrong Hessian there from 60 degrees of freedom on."""
+    spec = mujoco.MjSpec()
+    body = spec.worldbody
+    for i in range(61):
+        body = body.add_body(name=f"link{i}", pos=[0.0, 0.0, 0.1])
+        body.add_joint(name=f"joint{i}", axis=[0.0, 1.0, 0.0])
+        body.add_geom(size=[0.02, 0.02, 0.02])
+    assert mujoco.mj_isSparse(spec.copy().compile())
+    sparse = mujoco.mj_isSparse(compile_body(spec))
+    assert sparse == (mujoco.__version__ != "4.0.0")

@@ -337,12 +337,13 @@ class Family:
         return [self._draw(rng, split) for _ in range(n)]
 
     def _draw(self, rng: np.random.Generator, split: Split) -> Body:
-        places = list(self.parts)
+        places: list[str] = list(self.parts)
         if split == "composition":
             count = int(rng.integers(2, len(places) + 1))
         else:
             count = int(rng.uniform() < _WITH_PART) if places else 0
-        chosen = [places[i] for i in sorted(rng.permutation(len(places))[:count].tolist())]
+        numbers: list[int] = rng.permutation(len(places))[:count].tolist()
+        chosen = [places[i] for i in sorted(numbers)]
         parts = {place: str(rng.choice(list(self.parts[place]))) for place in chosen}
         far = split == "extrapolation"
         while True:

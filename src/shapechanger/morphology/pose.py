@@ -15,13 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.certificate.numbers import kinds_of
-from shapechanger.morphology.spec.carried import (
-    CLOSED,
-    SINGULAR,
-    close,
-    equality_rows,
-    largest,
-)
+from shapechanger.morphology.spec.carried import CLOSED, SINGULAR, close, equality_rows, largest
 
 _Array = NDArray[np.float64]
 _J: Final = mujoco.mjtJoint
@@ -31,20 +25,14 @@ GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFI
 # A joint starts at least this share of its range inside its limits, because the spring of a limit
 # pushes at the limit itself.
 _INSIDE: Final = 0.1
-# Distance within which a floor is searched; a higher body has no floor.
-_FAR_M: Final = 1000.0
-# A damping that slows a joint down by more than this factor in one step locks it.
-_LOCKED: Final = 1e5
-# Tolerance of the vertical part of an axis that counts as vertical.
-_VERTICAL: Final = 1e-6
-# Steps towards each start pose, and its largest violation, m or rad.
-_MOST_STEPS: Final = 40
-_START_CLOSED: Final = 1e-4
-# Shares of a drawn deviation that are tried, until one can be closed.
-_SHARES: Final = (0.5, 0.25, 0.125)
+_FAR_M: Final = 1000.0  # Distance within which a floor is searched; a higher body has none.
+_LOCKED: Final = 1e5  # A damping that slows a joint by more than this factor a step locks it.
+_VERTICAL: Final = 1e-6  # Tolerance of the vertical part of an axis that counts as vertical.
+_MOST_STEPS: Final = 40  # Towards each start pose.
+_START_CLOSED: Final = 1e-4  # Largest violation of a start pose, m or rad.
+_SHARES: Final = (0.5, 0.25, 0.125)  # Of a drawn deviation, tried until one can be closed.
 # Deviations from a drawn pose, rad or m, that are tried where the file's own pose is outside its
-# limits: steps get stuck at a stretched arm and at limits. Of Metaworld's Sawyer one in ten ends
-# closed.
+# limits: steps get stuck at a stretched arm. Of Metaworld's Sawyer one in ten ends closed.
 _BEND: Final = 0.6
 _MOST_BENDS: Final = 40
 
@@ -69,19 +57,25 @@ def moved_trees(model: mujoco.MjModel) -> list[int]:
     everything = list(range(int(model.ntree)))
     if len(everything) < 2 or not model.nu:
         return everything
-    kinds, moved = kinds_of(model), Counter[int]()
+    kinds, moved, of_body = kinds_of(model), Counter[int](), model.body_treeid.tolist()
+    carriers = {"joints": model.jnt_bodyid, "sites": model.site_bodyid, "geoms": model.geom_bodyid}
+    found: dict[str, list[set[int]]] = {"bodies": [{tree} for tree in of_body]}
+    found |= {kind: [{of_body[body]} for body in on.tolist()] for kind, on in carriers.items()}
+    on_path: list[int] = model.wrap_objid.tolist()
+    ways = zip(kinds["wrap_kinds"], on_path, strict=True)
+    wraps = [found[kind][at] if kind else set[int]() for kind, at in ways]
+    paths = zip(model.tendon_adr.tolist(), model.tendon_num.tolist(), strict=True)
+    found["tendons"] = [set[int]().union(*wraps[at : at + n]) for at, n in paths]
 
     def trees(kind: str, *ends: int) -> set[int]:
-        bodies = [body for end in ends for body in _bodies(model, kinds, kind, int(end))]
-        return {int(model.body_treeid[body]) for body in bodies} - {-1}
+        known = found.get(kind, [])  # None of a flex.
+        return set[int]().union(*(known[at] for at in ends if at >= 0 and known)) - {-1}
 
-    pulled = zip(kinds["actuator_target_kinds"], model.actuator_trnid, strict=True)
+    pulled = zip(kinds["actuator_target_kinds"], model.actuator_trnid.tolist(), strict=True)
     for kind, ends in pulled:
         moved.update(trees(kind, *(ends if kind == "sites" else ends[:1])))
-    coupled = [
-        trees(kinds["eq_kinds"][i], model.eq_obj1id[i], model.eq_obj2id[i])
-        for i in np.flatnonzero(model.eq_active0)
-    ]
+    pairs = zip(kinds["eq_kinds"], model.eq_obj1id.tolist(), model.eq_obj2id.tolist(), strict=True)
+    coupled = [trees(*pair) for pair, on in zip(pairs, model.eq_active0, strict=True) if on]
     for _ in everything:  # Joints that an equality couples count without an actuator.
         for tied in coupled:
             if not tied.isdisjoint(moved):
@@ -89,25 +83,12 @@ def moved_trees(model: mujoco.MjModel) -> list[int]:
     return sorted(moved, key=lambda tree: (-moved[tree], tree)) or everything
 
 
-def _bodies(model: mujoco.MjModel, kinds: dict[str, list[str]], kind: str, at: int) -> list[int]:
-    """Return the body that an element is on, or all along a tendon; none for other kinds."""
-    carriers = {"joints": model.jnt_bodyid, "sites": model.site_bodyid, "geoms": model.geom_bodyid}
-    if kind == "tendons" and at >= 0:
-        start = int(model.tendon_adr[at])
-        path = range(start, start + int(model.tendon_num[at]))
-        parts = [(kinds["wrap_kinds"][i], int(model.wrap_objid[i])) for i in path]
-        return [body for part in parts for body in _bodies(model, kinds, *part)]
-    if kind == "bodies":
-        return [at] if at >= 0 else []
-    return [int(carriers[kind][at])] if at >= 0 and kind in carriers else []
-
-
 class Lift(NamedTuple):
     """The coordinate of a pose that raises the trunk.
 
     Attributes:
         place: Its index in qpos.
-        up: 1 if a larger value is higher; -1 if it is lower, such as for a slide that points down.
+        up: 1 if a larger value is higher; -1 for a slide that points down.
         at_zero_m: Height of the trunk's origin in the world at the value 0, m.
     """
 
@@ -131,11 +112,11 @@ class Lift(NamedTuple):
 def travelling_body(model: mujoco.MjModel) -> int | None:
     """Return the index of the body that can go anywhere; None without one.
 
-    It has the robot's free joint or, without one, of its first slide without limits on a
-    body on the world, as of runners in a plane. Free objects are not the robot, see `robot_bodies`;
-    of several free robots it is the one that most actuators move.
+    It has the robot's free joint or, without one, its first slide without limits on a body on the
+    world, as of runners in a plane. Free objects are not the robot, see `robot_bodies`; of several
+    free robots it is the one that most actuators move.
     """
-    joints = _in_robot(model, model.jnt_type == _J.mjJNT_FREE) or _unlimited_slides(model)
+    joints = _travelling_joints(model)
     return int(model.jnt_bodyid[joints[0]]) if joints else None
 
 
@@ -145,35 +126,32 @@ def trunk_lift(model: mujoco.MjModel) -> Lift | None:
     It has the robot's free joint or, without one, of its first vertical slide without limits
     on a body on the world. A slide with limits is a hoist, which does not stand.
     """
-    for joint in _in_robot(model, model.jnt_type == _J.mjJNT_FREE):
-        return Lift(int(model.jnt_qposadr[joint]) + 2, 1.0, 0.0)
-    for joint in _unlimited_slides(model):
-        body, axis = model.jnt_bodyid[joint], np.zeros(3)
+    for joint in _travelling_joints(model):
+        place, body, axis = int(model.jnt_qposadr[joint]), model.jnt_bodyid[joint], np.zeros(3)
+        if model.jnt_type[joint] == _J.mjJNT_FREE:
+            return Lift(place + 2, 1.0, 0.0)
         mujoco.mju_rotVecQuat(axis, model.jnt_axis[joint], model.body_quat[body])
         if abs(axis[2]) > 1.0 - _VERTICAL:
-            place, up = int(model.jnt_qposadr[joint]), float(np.sign(axis[2]))
+            up = float(np.sign(axis[2]))
             # `ref` is the value at which the body is where the model puts it.
             return Lift(place, up, float(model.body_pos[body, 2] - up * model.qpos0[place]))
     return None
 
 
 def _moving_dofs(model: mujoco.MjModel) -> NDArray[np.bool_]:
-    """Return whether each degree of freedom can move, shape (nv,).
-
-    Files lock a joint with a damping of 1e11, and MuJoCo diverges unless it is at rest.
-    """
+    # Files lock a joint with a damping of 1e11, and MuJoCo diverges unless it is at rest.
     return model.dof_damping * model.opt.timestep <= _LOCKED * model.dof_M0
 
 
-def _unlimited_slides(model: mujoco.MjModel) -> list[int]:
-    """Return the slides that can go anywhere, of the robot's bodies on the world."""
+def _travelling_joints(model: mujoco.MjModel) -> list[int]:
+    """Return the robot's free joints or, without one, slides without limits on the world."""
     slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
     slides &= _moving_dofs(model)[model.jnt_dofadr]
-    return _in_robot(model, slides & (model.body_parentid[model.jnt_bodyid] == 0))
+    slides &= model.body_parentid[model.jnt_bodyid] == 0
+    return _in_robot(model, model.jnt_type == _J.mjJNT_FREE) or _in_robot(model, slides)
 
 
 def _in_robot(model: mujoco.MjModel, joints: NDArray[np.bool_]) -> list[int]:
-    """Return the joints of the robot among some; the tree with most actuators comes first."""
     found = np.flatnonzero(joints).tolist()
     if model.ntree < 2 or not found:
         return found
@@ -234,7 +212,6 @@ def floor_height(model: mujoco.MjModel, pose: _Array) -> float:
 
 
 def _posed(model: mujoco.MjModel, pose: _Array) -> mujoco.MjData:
-    """Return data with the kinematics of a pose (nq,)."""
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
@@ -347,7 +324,6 @@ class StartRules:
                 self.lift.raise_by(pose, -gap)
 
     def _violation(self, pose: _Array, data: mujoco.MjData) -> float:
-        """Return the largest violation of an equality at a pose, which `data` take."""
         data.qpos[:] = pose
         mujoco.mj_fwdPosition(self._model, data)
         return largest(equality_rows(self._model, data)[1])
@@ -366,10 +342,7 @@ class StartRules:
         return best
 
     def _tries(self, drawn: _Array, start: _Array, is_inside: bool) -> Iterator[_Array]:
-        """Yield poses to close: the drawn one, and then with smaller deviations from the start.
-
-        Of a start outside the limits, poses around the drawn one follow.
-        """
+        """Yield the drawn pose, nearer ones, and of a start outside the limits others around it."""
         yield drawn
         deviation, rng = np.zeros(self._model.nv), np.random.default_rng(0)
         mujoco.mj_differentiatePos(self._model, deviation, 1.0, start, drawn)
@@ -380,7 +353,6 @@ class StartRules:
             yield self._moved(drawn, np.where(self.robot_dofs, bend, 0.0))
 
     def _moved(self, pose: _Array, step: _Array) -> _Array:
-        """Return a pose moved by a step (nv,), inside the limits."""
         moved = pose.copy()
         mujoco.mj_integratePos(self._model, moved, step, 1.0)
         return self.keep_within_limits(moved)

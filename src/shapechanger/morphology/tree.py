@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.pose import GROUND, robot_bodies, travelling_body
+from shapechanger.morphology.spec.references import OF_JOINTS
 
 _Array = NDArray[np.float64]
+_J: Final = mujoco.mjtJoint
 _LONG: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
-_MOVES_ONE_WAY: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-_TO_JOINT: Final = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-# A smaller moment, m or 1, is rounding.
-_NO_MOMENT: Final = 1e-9
-# Moments that differ by a smaller share are equal.
-_EQUAL: Final = 1e-6
+_MOVES_ONE_WAY: Final = (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE))
+_NO_MOMENT: Final = 1e-9  # A smaller moment, m or 1, is rounding.
+_EQUAL: Final = 1e-6  # Moments that differ by a smaller share are equal.
 
 LIMB_NUMBERS: Final = (
     *("joint x", "joint y", "joint z", "distance"),  # From the trunk's origin: direction, and m.
@@ -91,11 +90,8 @@ def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
     mujoco.mj_tendon(model, data)
     mujoco.mj_transmission(model, data)
     trunk, robot = travelling_body(model) or 0, robot_bodies(model)
-    joints = [
-        j
-        for j in np.flatnonzero(np.isin(model.jnt_type, _MOVES_ONE_WAY)).tolist()
-        if robot[model.jnt_bodyid[j]] and (model.jnt_bodyid[j] != trunk or trunk == 0)
-    ]
+    moves = np.isin(model.jnt_type, _MOVES_ONE_WAY) & robot[model.jnt_bodyid]
+    joints = np.flatnonzero(moves & ((model.jnt_bodyid != trunk) | (trunk == 0))).tolist()
     # The last joint of a body moves it.
     mover = {int(model.jnt_bodyid[j]): j for j in joints}
     owner: dict[int, int | None] = {0: None}
@@ -112,29 +108,23 @@ def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
         numbers = _limb_numbers(model, data, j, own, trunk, strength)
         names = tuple(model.body(body).name for body in own)
         limbs.append(Limb(model.joint(j).name, names, actuator, numbers))
-    own = [body for body in owner if owner[body] is None and robot[body]]
-    own = own if trunk else [0, *own]
+    own = [body for body in owner if owner[body] is None and (robot[body] or body == trunk == 0)]
     floor = np.flatnonzero(model.geom_bodyid == 0)
-    return Tree(
-        tuple(model.body(body).name for body in own),
-        (
-            _decades(float(model.body_mass[own].sum())),
-            _decades(float(model.body_subtreemass[trunk])),
-            float(data.xpos[trunk, 2]),
-            float(_farthest(model, data, own, data.xpos[trunk])[1]),
-            float(model.geom_friction[floor[0], 0]) if floor.size else 1.0,
-            float(np.linalg.norm(model.opt.gravity)) / 9.81,
-        ),
-        tuple(limbs),
+    numbers = (
+        *(_decades(model.body_mass[own].sum()), _decades(model.body_subtreemass[trunk])),
+        *(data.xpos[trunk, 2], _farthest(model, data, own, data.xpos[trunk])[1]),
+        model.geom_friction[floor[0], 0] if floor.size else 1.0,
+        np.linalg.norm(model.opt.gravity) / 9.81,
     )
+    names = tuple(model.body(body).name for body in own)
+    return Tree(names, tuple(map(float, numbers)), tuple(limbs))
 
 
 def _moments(model: mujoco.MjModel, data: mujoco.MjData) -> _Array:
     """Return the torque or force on each degree of freedom for a force of 1 of each actuator."""
     outputs = np.zeros((len(data.moment_rownnz), model.nv))
     mujoco.mju_sparse2dense(
-        *(outputs, data.actuator_moment, data.moment_rownnz, data.moment_rowadr),
-        data.moment_colind,
+        *(outputs, data.actuator_moment, data.moment_rownnz, data.moment_rowadr), data.moment_colind
     )
     ends = zip(model.actuator_outadr, model.actuator_outnum, strict=True)
     return np.array([np.abs(outputs[at : at + n]).max(axis=0, initial=0.0) for at, n in ends])
@@ -160,7 +150,6 @@ def _limb_numbers(
     trunk: int,
     strength: float,
 ) -> tuple[float, ...]:
-    """Return the numbers of a limb."""
     body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
     into_trunk = data.xmat[trunk].reshape(3, 3).T
     anchor: _Array = data.xanchor[joint]
@@ -174,21 +163,21 @@ def _limb_numbers(
         *_direction_and_length(into_trunk @ (anchor - data.xpos[trunk])),
         *(into_trunk @ data.xaxis[joint]),
         *_direction_and_length(into_trunk @ end),
-        *(_decades(float(model.body_mass[bodies].sum())), _decades(model.body_subtreemass[body])),
+        *(_decades(model.body_mass[bodies].sum()), _decades(model.body_subtreemass[body])),
         *(data.qpos[model.jnt_qposadr[joint]], *(model.jnt_range[joint] if limited else (0, 0))),
         math.log10(1.0 + strength) / 2.0,
         math.log10(1.0 + model.dof_damping[dof]),
         math.log10(1.0 + model.dof_armature[dof]),
-        *(limited, model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE, depth),
+        *(limited, model.jnt_type[joint] == _J.mjJNT_SLIDE, depth),
     )
-    return tuple(float(number) for number in numbers)
+    return tuple(map(float, numbers))
 
 
 def _actuators_by_joint(
     model: mujoco.MjModel, moments: _Array, joints: list[int], owner: dict[int, int | None]
 ) -> dict[int, int]:
     """Return the actuator that moves each joint; see `Limb.actuator`."""
-    to_joint = np.isin(model.actuator_trntype, _TO_JOINT)
+    to_joint = np.isin(model.actuator_trntype, [int(kind) for kind in OF_JOINTS])
     targets: list[int] = model.actuator_trnid[:, 0].tolist()
     found = {targets[actuator]: actuator for actuator in np.flatnonzero(to_joint).tolist()}
     for actuator in np.flatnonzero(~to_joint).tolist():
@@ -224,7 +213,6 @@ def _farthest(
 
 
 def _direction_and_length(vector: _Array) -> tuple[float, ...]:
-    """Return a unit vector and the length, m; zeros for no length."""
     length = float(np.linalg.norm(vector))
     return (*(vector / max(length, 1e-9)), length)
 

@@ -1,11 +1,14 @@
-"""Certificates of shifts, and refused shifts."""
+"""Certificates of shifts, their rollouts, and models whose numbers do not fit together."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 from gymnasium.envs.mujoco.ant_v5 import AntEnv
@@ -15,9 +18,14 @@ import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Edit, Friction, Mass
-from shapechanger.morphology.certificate import certify
-from tests.morphology.scenes import ASSETS
-from tests.morphology.swing import Swing
+from shapechanger.morphology.certificate import (
+    certify,
+    compare_rollouts,
+    inconsistencies,
+    matched_commands,
+)
+from tests.morphology.scenes import ASSETS, EVERYTHING, asset, everything
+from tests.morphology.swing import Swing, Wrapper, broken, dictionary, late, longer, noisy
 
 
 def test_a_longer_arm_is_certified() -> None:
@@ -120,3 +128,224 @@ def test_a_small_change_is_a_shift() -> None:
     target = gymnasium.make("shapechanger/HalfCheetah-v1", body=Mass("torso", scale=1.000001))
     certificate = certify(gymnasium.make("shapechanger/HalfCheetah-v1"), target)
     assert "mass" in {change.quantity for change in certificate.changes}
+
+
+@pytest.mark.parametrize("wrapped", [lambda env: env, dictionary, broken])
+@pytest.mark.parametrize("steps", [0, 20])
+def test_equal_environments_have_equal_rollouts(wrapped: Any, steps: int) -> None:
+    """Also one env twice, dictionaries in the order of their keys, and equal NaN."""
+    env = wrapped(Swing())
+    for target in (wrapped(Swing()), env):
+        rollout = compare_rollouts(env, target, steps=steps)
+        assert rollout.identical
+        assert rollout.differs_by_rounding
+        assert str(rollout) == (
+            f"{steps} steps from the same seed with the same commands: the 2 numbers that both "
+            "observe are equal throughout."
+        )
+
+
+def test_the_first_and_the_largest_difference_are_reported() -> None:
+    source, target = Swing(), Swing(length=0.8)
+    text = str(compare_rollouts(source, target, steps=25, seed=3))
+    commands, _ = matched_commands(source.action_layout, target.action_layout, 25, 3)
+    seen = [
+        np.stack([env.reset(seed=3)[0], *(env.step(command)[0] for command in commands)])
+        for env in (source, target)
+    ]
+    gap = np.abs(seen[0] - seen[1])
+    step, feature = np.unravel_index(np.argmax(gap), gap.shape)
+    name = source.observation_layout.names[feature]
+    assert "observations part at step 1 in hinge/velocity, and furthest at step" in text
+    assert f"at step {step} in {name}, by {gap.max():.4g}. Rewards differ by up to" in text
+
+
+def test_motors_of_the_same_name_get_the_same_commands() -> None:
+    source, target = Swing(), Swing(wrist=True)
+    rollout = compare_rollouts(source, target, steps=10)
+    assert "Only the target observes 2 more, such as wrist/angle." in str(rollout)
+    one, two = np.asarray(source.commands), np.asarray(target.commands)
+    assert one.dtype == np.float32
+    assert np.all(np.abs(one) <= 1.0)
+    assert len(np.unique(one)) == 10
+    np.testing.assert_array_equal(one[:, 0], two[:, 0])
+    np.testing.assert_array_equal(two[:, 1], 0.0)
+    compare_rollouts(source, target, steps=10, seed=1)
+    assert not np.array_equal(one, np.asarray(source.commands))
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "steps", "sentence"),
+    [
+        (Swing, lambda: Swing(limit=7), 7, "equal throughout. Only the target ended its episode."),
+        (lambda: Swing(limit=3), lambda: Swing(limit=7), 3, "Only the source ended its episode."),
+        (Swing, lambda: Swing(bonus=1.0), 20, "equal throughout. Rewards differ by up to 1 a step"),
+        (Swing, lambda: noisy(Swing()), 20, "observations part at the reset in hinge/"),
+        # NaN on one side is the largest finite difference.
+        (Swing, lambda: broken(Swing()), 20, "in hinge/angle, by 1.798e+308."),
+        # A wrapper without a layout of its own: numbers are compared by their places.
+        (
+            Swing,
+            lambda: longer(Swing()),
+            20,
+            "Only the target observes 1 more, such as observation[2]",
+        ),
+        (lambda: longer(Swing()), lambda: longer(Swing(gear=2.0)), 20, "in observation[1], by"),
+    ],
+)
+def test_each_difference_is_a_sentence(source: Any, target: Any, steps: int, sentence: str) -> None:
+    """None of them is rounding."""
+    rollout = compare_rollouts(source(), target(), steps=20)
+    assert rollout.steps == steps
+    assert not rollout.identical
+    assert not rollout.differs_by_rounding
+    assert sentence in str(rollout)
+
+
+def test_equal_ends_of_equal_episodes_are_equal() -> None:
+    assert compare_rollouts(Swing(limit=7), Swing(limit=7)).identical
+
+
+def test_without_common_features_rollouts_differ() -> None:
+    """A block has a name per number."""
+    target = Swing()
+    target.observation_layout = Layout((Feature("block", "1", shape=(2, 1)),))
+    rollout = compare_rollouts(Swing(), target, steps=5)
+    assert not rollout.differs_by_rounding
+    assert "the 0 numbers that both" in str(rollout)
+    assert "Only the target observes 2 more, such as block[0]." in str(rollout)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "expected"),
+    [
+        ((-2.0, 3.0), (-2.0, 3.0)),
+        ((-math.inf, math.inf), (-1.0, 1.0)),
+        ((5.0, math.inf), (5.0, 6.0)),
+        ((-math.inf, -5.0), (-6.0, -5.0)),
+    ],
+)
+def test_commands_cover_their_range(
+    bounds: tuple[float, float], expected: tuple[float, float]
+) -> None:
+    layout, (low, high) = Layout((Feature("motor", "1", *bounds),)), expected
+    commands, _ = matched_commands(layout, layout, 1000, 0)
+    assert low <= commands.min() < low + 0.05 * (high - low)
+    assert high >= commands.max() > high - 0.05 * (high - low)
+
+
+def test_commands_are_in_both_ranges() -> None:
+    """In the intersection, or each in its own range if it is empty; else nearest to zero."""
+    wide, narrow, apart = (
+        Layout((Feature("motor", "1", *bounds),))
+        for bounds in ((-3.0, 3.0), (0.5, 1.0), (5.0, 6.0))
+    )
+    one, two = matched_commands(wide, narrow, 50, 0)
+    np.testing.assert_array_equal(one, two)
+    assert (one.min() >= 0.5, one.max() <= 1.0) == (True, True)
+    one, two = matched_commands(narrow, apart, 50, 0)
+    assert (one.max() <= 1.0, two.min() >= 5.0) == (True, True)
+    _, alone = matched_commands(Layout(()), narrow, 3, 0)
+    np.testing.assert_array_equal(alone, np.full((3, 1), 0.5, np.float32))
+
+
+@pytest.mark.parametrize("after", [0, 1, 50, 100])
+def test_a_late_shift_is_no_rounding(after: int) -> None:
+    """What is sensed may differ late, by little, and between models that round differently."""
+    heavy = Swing(mass=1.0 + 1e-15)
+    assert not certify(heavy, late(Swing(), after, 1e-6)).is_empty
+    assert certify(Swing(), late(Swing(), after, 1e-12), allow_empty=True).is_empty
+
+
+def test_another_end_of_the_episode_is_no_rounding() -> None:
+    """Equal numbers with another end differ in what the episode is."""
+
+    class _Ends(Wrapper):
+        def step(self, action: object, /) -> object:  # type: ignore[override]
+            observation, reward, _, *rest = self.env.step(action)
+            return (observation, reward, len(self.env.commands) > 30, *rest)
+
+    certificate = certify(Swing(), _Ends(Swing()))
+    assert certificate.same_model
+    assert not certificate.is_empty
+    assert certificate.verdict.endswith("are the same; what is sensed, done or rewarded differs.")
+
+
+@pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "everything"])
+def test_compiled_models_are_consistent(name: str) -> None:
+    assert inconsistencies(everything() if name == "everything" else asset(name)) == ()
+
+
+def test_a_mass_written_into_a_compiled_model_is_found() -> None:
+    """By its stale constants, with the values measured on Ant-v5, and then by its inertia."""
+    model = asset("ant")
+    model.body("torso").mass[:] = 3.0
+    message = " ".join(inconsistencies(model))
+    assert "body_subtreemass is 0.9109, but the model makes it 3.584" in message
+    assert "torso: body_invweight0 is 1.101, but the model makes it 0.2793" in message
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    assert inconsistencies(model) == ()
+    (message,) = inconsistencies(model, asset("ant"))
+    assert message.startswith("torso: mass goes from 0.3272 to 3 kg, but its inertia stays 0.00818")
+    model.body("torso").inertia[:] *= 2.0
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    assert inconsistencies(model, asset("ant")) == ()
+    assert inconsistencies(asset("ant"), asset("hopper")) == ()
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (
+            lambda m: m.body("wheel").ipos.fill(0.1),
+            "wheel: body_sameframe is 1, but the model makes it 3, so body_ipos or body_iquat",
+        ),
+        (lambda m: m.geom("leg").pos.fill(0.1), "geom_pos or geom_quat is ignored"),
+        (lambda m: m.geom("leg").size.fill(0.2), "leg: geom_rbound is 0.1"),
+        (lambda m: m.body_gravcomp.fill(1.0), "flg_gravcomp is 0, but the model makes it 1, so"),
+        (lambda m: m.geom_adhesion.fill(1.0), "so geom_adhesion and pair_adhesion are ignored"),
+        (lambda m: m.geom_surfacevel.fill(1.0), "so geom_surfacevel is ignored"),
+        (lambda m: m.actuator_damping.fill(1.0), "so the actuator's damping or armature is igno"),
+        (lambda m: m.tendon_length0.fill(9.0), "tendon_length0 is 9"),
+    ],
+)
+def test_writes_without_effect_are_found(
+    edit: Callable[[mujoco.MjModel], object], message: str
+) -> None:
+    model = mujoco.MjModel.from_xml_string(EVERYTHING.replace('gravcomp=".1"', ""))
+    edit(model)
+    found = " ".join(inconsistencies(model))
+    assert message in found
+    assert "Call mujoco.mj_setConst after writing to a compiled model." in found
+
+
+def test_bits_that_were_not_compiled_are_found() -> None:
+    model = everything()
+    model.geom("wheel").contype[:] = 1
+    (message,) = inconsistencies(model)
+    assert message.startswith("wheel: geom_contype or geom_conaffinity has bits that its body")
+    model = everything()
+    model.geom("paint").contype[:] = 1
+    (message,) = inconsistencies(model)
+    assert message.startswith("MuJoCo cannot derive its constants from the model: ")
+
+
+@pytest.mark.parametrize(
+    ("inertia", "possible"),
+    [
+        ((0.0, 0.0, 0.0), False),
+        ((-1.0, 1.0, 1.0), False),
+        ((0.1, 0.1, 0.3), False),
+        ((1.0, 1.0, 2.0), True),
+    ],
+)
+def test_impossible_inertias_are_found(inertia: tuple[float, float, float], possible: bool) -> None:
+    """Moments must be positive, and the largest at most the sum of the others, as of a thin rod."""
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body name='b'><joint/><inertial mass='1' pos='0 0 0' "
+        "diaginertia='1 1 2'/></body></worldbody></mujoco>"
+    )
+    model.body("b").inertia[:] = inertia
+    found = [each for each in inconsistencies(model) if each.startswith("b: mass 1 kg comes with")]
+    assert bool(found) != possible
+    assert inconsistencies(mujoco.MjModel.from_xml_string("<mujoco/>")) == ()

@@ -9,11 +9,7 @@ from typing import Any
 import mujoco
 import pytest
 
-from shapechanger.morphology.certificate.changes import (
-    Change,
-    compare,
-    grouped,
-)
+from shapechanger.morphology.certificate.changes import Change, compare, grouped
 from tests.morphology.scenes import asset, asset_spec, everything
 
 _SHANK = "left_ankle_geom"

@@ -143,14 +143,6 @@ def test_contact_pairs_are_those_of_mujoco(seed: int, flag: str) -> None:
     assert set(_contacts(model)) == moving
 
 
-def test_friction_has_a_lower_bound() -> None:
-    """Zero friction becomes 1e-5."""
-    model = _scene(floor="friction='0 0 0'", ball="friction='0 0 0' condim='6'")
-    contact = _contacts(model)["ball + floor"]
-    assert contact["friction"] == (1e-5,) * 5
-    _assert_equal(contact, _simulated(model)["ball + floor"][0])
-
-
 def test_the_override_replaces_all_but_dimension_gap_and_adhesion() -> None:
     """With the flag set, the geoms' own parameters do not count."""
     option = "o_margin='.1' o_solref='.05 3' o_solimp='.8 .9 .01 .5 2' o_friction='.1 .2 .3 .4 0'"

@@ -147,21 +147,18 @@ def test_a_number_counts_where_the_table_says_so_and_nowhere_else(
 
 # Arrays of which several numbers of the table are made, and a row that is written.
 _MADE = {
+    **dict.fromkeys(("body_gravcomp", "body_invweight0", "body_subtreemass", "geom_rbound"), 4),
+    **{"dof_M0": 3, "dof_invweight0": 3, "geom_contype": 3, "geom_conaffinity": 8},
+    **{"jnt_limited": 2, "eq_obj1id": 2, "wrap_prm": -1},
+    **{f"geom_{name}": 0 for name in ("friction", "solref", "solimp", "condim", "margin", "gap")},
+    **{f"pair_{name}": 0 for name in ("friction", "solref", "solimp", "dim", "margin", "gap")},
+    **{f"tendon_{name}": 0 for name in ("limited", "length0", "invweight0", "actfrclimited")},
     **{
-        "body_gravcomp": 4,
-        "body_invweight0": 4,
-        "body_subtreemass": 4,
-        "jnt_limited": 2,
-        "dof_M0": 3,
+        f"actuator_{name}": 0
+        for name in ("trnid", "ctrllimited", "forcelimited", "length0", "acc0")
     },
-    **{"dof_invweight0": 3, "geom_rbound": 4, "geom_friction": 0, "geom_solref": 0},
-    **{"geom_solimp": 0, "geom_condim": 0, "geom_margin": 0, "geom_gap": 0, "geom_contype": 3},
-    **{"geom_conaffinity": 8, "mesh_vert": 0, "hfield_data": 0, "hfield_size": 0},
-    **{"pair_friction": 0, "pair_dim": 0, "pair_solref": 0, "pair_solimp": 0, "pair_margin": 0},
-    **{"pair_gap": 0, "exclude_signature": 0, "eq_obj1id": 2, "wrap_prm": -1, "wrap_objid": 0},
-    **{"tendon_limited": 0, "tendon_length0": 0, "tendon_invweight0": 0, "tendon_actfrclimited": 0},
-    **{"actuator_trnid": 0, "actuator_ctrllimited": 0, "actuator_forcelimited": 0},
-    **{"actuator_length0": 0, "actuator_acc0": 0},
+    **dict.fromkeys(("mesh_vert", "hfield_data", "hfield_size"), 0),
+    **{"exclude_signature": 0, "wrap_objid": 0},
 }
 # Zero switches these off; the others become larger.
 _OFF = ("limited", "contype", "conaffinity", "signature")

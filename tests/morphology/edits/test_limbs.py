@@ -9,37 +9,9 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology import (
-    AddLimb,
-    AddSegment,
-    Cut,
-    Edit,
-    Remove,
-    Split,
-)
-from tests.morphology.models import (
-    arm,
-    built,
-    capsule_mass,
-    leg,
-    limb,
-    mass,
-    posed,
-    spec_of,
-)
+from shapechanger.morphology import AddLimb, AddSegment, Cut, Edit, Remove, Split
+from tests.morphology.models import arm, built, capsule_mass, leg, limb, mass, posed, spec_of
 from tests.morphology.scenes import asset_spec
-
-_MESH_LIMB = """
-<mujoco>
-  <asset><mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"/></asset>
-  <worldbody>
-    <body name="trunk"><geom name="trunk" size=".1"/>
-      <body name="claw" pos=".2 0 0"><joint name="claw"/>
-        <geom name="claw" type="mesh" mesh="wedge"/></body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
 
 
 def _bodies(model: mujoco.MjModel) -> list[str]:
@@ -210,13 +182,6 @@ def test_a_body_without_hinge_needs_an_axis() -> None:
 # --- AddLimb -----------------------------------------------------------------------------------
 
 
-def test_a_mesh_cannot_be_scaled() -> None:
-    for edit in (AddLimb("claw", "_2", 1.0, size=2.0), Remove("claw").partly(0.5)):
-        with pytest.raises(MorphologyError, match=r"'claw(_2)?' holds 'claw(_2)?', a mesh"):
-            built(spec_of(_MESH_LIMB), edit)
-    assert built(spec_of(_MESH_LIMB), Remove("claw")).nbody == 2
-
-
 @pytest.mark.parametrize(
     "edit",
     [
@@ -256,6 +221,3 @@ def test_a_partial_limb_is_small_and_weak(
         assert model.body_mass[body] == pytest.approx(share**3 * full.body_mass[body])
     if size != 1.0:
         assert full.body("thigh_2").mass == pytest.approx(size**3 * full.body("thigh").mass)
-
-
-# --- Combinations ------------------------------------------------------------------------------

@@ -1,7 +1,8 @@
-"""Edits of one number, given as a ratio or as a value."""
+"""Edits of one number, of joints, motors and freedom, and of places."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import mujoco
@@ -10,13 +11,37 @@ import pytest
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
+    AddFloor,
+    AddFreeJoint,
+    AddMotor,
     Damping,
     Friction,
     Gear,
+    JointRange,
+    Lock,
     Mass,
+    PlaceBody,
+    PlaceGeom,
+    StartHeight,
     Stiffness,
+    TotalMass,
+    compile_body,
+    reshape,
 )
-from tests.morphology.models import arm, built, leg, limb, mass, spec_of
+from tests.morphology.models import (
+    URDF,
+    ant,
+    arm,
+    built,
+    capsule_inertia,
+    capsule_mass,
+    gantry,
+    leg,
+    limb,
+    mass,
+    spec_of,
+    tip,
+)
 
 _MOTORS = """
 <mujoco>
@@ -117,3 +142,149 @@ def test_a_largest_force_scales_with_all_of_its_motors() -> None:
         model = built(spec, Gear(pattern, scale=3.0))
         limits = model.jnt_actfrcrange[model.joint("upper").id]
         np.testing.assert_array_equal(limits, [-largest, largest])
+
+
+def _range(model: mujoco.MjModel, joint: str) -> list[float]:
+    return model.joint(joint).range.tolist()
+
+
+@pytest.mark.parametrize("degrees", range(-180, 181, 6))
+def test_degrees_are_exact(degrees: int) -> None:
+    """Limits of whole degrees equal bitwise those of a file in degrees."""
+    spec = limb('<geom size=".1"/>')
+    spec.joint("link").range = [degrees, 200.0]
+    edited = built(limb('<geom size=".1"/>'), JointRange("link", math.radians(degrees), 3.5))
+    assert edited.joint("link").range[0] == built(spec).joint("link").range[0]
+
+
+def test_partial_limits_of_a_slide_come_from_far_away() -> None:
+    edit = JointRange("y", -1.0, 2.0)
+    assert _range(built(gantry(), edit), "y") == [-1.0, 2.0]
+    assert _range(built(gantry(), edit.partly(0.5)), "y") == [-4.0, 5.0]
+
+
+def test_joints_are_locked_in_the_middle() -> None:
+    free = built(leg())
+    for edit, angle in (
+        (Lock("knee"), math.radians(-45.0)),
+        (Lock("knee", 0.0), 0.0),
+        (Lock("knee", -1.2), -1.2),
+    ):
+        locked = built(leg(), edit)
+        np.testing.assert_allclose(tip(locked, "toe"), tip(free, "toe", {"knee": angle}))
+    model = built(limb('<geom size=".1"/>'), Lock("link"))
+    np.testing.assert_allclose(model.body("link").quat, [1.0, 0.0, 0.0, 0.0])
+
+
+def test_a_slide_without_limits_is_locked_at_a_position() -> None:
+    assert built(gantry(), Lock("y", 0.3)).njnt == 4
+    half = built(gantry(), Lock("y", 0.3).partly(0.5))
+    assert _range(half, "y") == pytest.approx([0.3 - 1.0, 0.3 + 1.0])
+
+
+# --- Motors and freedom ------------------------------------------------------------------------
+
+
+def test_motors_are_as_strong_as_the_model_allows() -> None:
+    """The effort of a URDF is the gear; others need one."""
+    model = built(spec_of(URDF), AddMotor("shoulder"), AddMotor("elbow", 3.0))
+    assert [model.actuator(i).name for i in range(model.nu)] == ["shoulder", "elbow"]
+    np.testing.assert_array_equal(model.actuator_gear[:, 0], [7.0, 3.0])
+    np.testing.assert_array_equal(model.actuator_ctrlrange, [[-1.0, 1.0]] * 2)
+    with pytest.raises(MorphologyError, match="no largest torque or force of 'elbow': give a gear"):
+        reshape(spec_of(URDF), [AddMotor("*")])
+    half = built(spec_of(URDF), AddMotor("shoulder", amount=0.5))
+    assert half.actuator_gear[0, 0] == 3.5
+
+
+def test_a_motor_of_something_else_is_no_motor_of_the_joint() -> None:
+    """A tendon and a joint may share a name."""
+    spec = spec_of(
+        """
+        <mujoco><worldbody>
+          <body><joint name="pull" axis="0 1 0"/><geom size=".1"/></body></worldbody>
+        <tendon><fixed name="pull"><joint joint="pull" coef="1"/></fixed></tendon>
+        <actuator><motor name="muscle" tendon="pull"/></actuator></mujoco>"""
+    )
+    assert built(spec, AddMotor("*", 2.0)).nu == 2
+
+
+def test_a_fixed_robot_is_set_free() -> None:
+    """It falls with its whole mass, although MuJoCo merges a URDF's base with the world."""
+    fixed = built(spec_of(URDF))
+    assert (fixed.nq, fixed.body_mass[0]) == (2, 0.0)
+    free = compile_body(
+        spec_of(URDF), (AddFreeJoint("base"), StartHeight("base", 0.5), Mass("base", scale=2.0))
+    )
+    assert (free.nq, free.joint(0).name) == (9, "base_free")
+    assert free.body("base").mass == 4.0
+
+
+def test_a_body_moves_with_what_it_carries() -> None:
+    """Joints, geoms, sites and children keep their places relative to the body."""
+    before, after = built(leg()), built(leg(), PlaceBody("thigh", (0.0, 0.5, 0.1)))
+    np.testing.assert_array_equal(after.body("thigh").pos, [0.0, 0.5, 0.1])
+    for field in ("geom_pos", "jnt_pos", "site_pos", "body_mass", "body_inertia", "body_ipos"):
+        np.testing.assert_array_equal(getattr(after, field), getattr(before, field))
+    np.testing.assert_allclose(tip(after, "toe") - tip(before, "toe"), [0.0, 0.3, 0.1])
+
+
+def test_a_geom_is_placed_by_its_ends() -> None:
+    """The body's mass and inertia follow, and nothing else moves."""
+    edit = PlaceGeom("thigh", (0.0, 0.0, 0.1), (0.0, 0.3, -0.3), radius=0.05)
+    before, after = built(leg()), built(leg(), edit)
+    assert after.geom("thigh").size[:2] == pytest.approx([0.05, 0.25])
+    np.testing.assert_allclose(after.geom("thigh").pos, [0.0, 0.15, -0.1])
+    across, along = capsule_inertia(0.05, 0.5, 500.0)
+    assert after.body("thigh").mass == pytest.approx(capsule_mass(0.05, 0.5, 500.0))
+    np.testing.assert_allclose(sorted(after.body("thigh").inertia), sorted([across, across, along]))
+    for site in ("scar", "knee_cap", "toe"):
+        np.testing.assert_array_equal(tip(after, site), tip(before, site))
+
+
+@pytest.mark.parametrize("ends", [(0.1, 0.9), (0.9, 0.1)])
+def test_halfway_lies_between(ends: tuple[float, float]) -> None:
+    """The ends of a geom given by its pose have no order: each goes to the nearer new one."""
+    model = limb('<geom name="rod" type="capsule" size=".1 .2" pos="0 0 .3"/>')
+    start, end = ((0.0, 0.0, height) for height in ends)
+    whole = built(model, PlaceGeom("rod", start, end))
+    assert whole.geom("rod").size[1] == pytest.approx(0.4)
+    half = built(model, PlaceGeom("rod", start, end, amount=0.5))
+    assert half.geom("rod").size[1] == pytest.approx(0.3)
+    assert half.geom("rod").pos[2] == pytest.approx(0.4)
+
+
+def test_a_geom_is_moved_by_its_middle() -> None:
+    """Whatever its shape, and halfway at half the amount; its axes keep their directions."""
+    before = built(leg())
+    for geom in ("sole", "shin", "trunk"):
+        after = built(leg(), PlaceGeom(geom, middle=(0.0, 0.1, 0.2)))
+        np.testing.assert_allclose(after.geom(geom).pos, [0.0, 0.1, 0.2], atol=1e-15)
+        np.testing.assert_array_equal(after.geom(geom).quat, before.geom(geom).quat)
+        half = built(leg(), PlaceGeom(geom, middle=(0.0, 0.1, 0.2), amount=0.5))
+        np.testing.assert_allclose(
+            half.geom(geom).pos,
+            0.5 * (before.geom(geom).pos + np.array([0.0, 0.1, 0.2])),
+            atol=1e-15,
+        )
+
+
+def test_the_total_mass_is_set() -> None:
+    """After other edits, with the inertia in proportion; halfway at half the amount."""
+    before = built(ant(), Mass("torso", scale=3.0))
+    after = built(ant(), Mass("torso", scale=3.0), TotalMass(14.0))
+    assert after.body_mass.sum() == pytest.approx(14.0, rel=1e-12)
+    factor = 14.0 / before.body_mass.sum()
+    np.testing.assert_allclose(after.body_inertia, factor * before.body_inertia, rtol=1e-9)
+    half = built(ant(), Mass("torso", scale=3.0), TotalMass(14.0, amount=0.5))
+    assert half.body_mass.sum() == pytest.approx(0.5 * (14.0 + before.body_mass.sum()))
+
+
+def test_a_robot_lands_on_its_floor() -> None:
+    """The box of 0.2 m comes to rest 0.1 m above it."""
+    body = (AddFreeJoint("base"), StartHeight("base", 0.7), AddFloor(friction=0.5, height=0.5))
+    model = compile_body(spec_of(URDF), body)
+    assert model.geom("floor").friction[0] == 0.5
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, nstep=500)
+    assert data.qpos[2] == pytest.approx(0.6, abs=0.01)

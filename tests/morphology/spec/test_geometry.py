@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology import Cut, Radius, Stretch
+from shapechanger.morphology import AddLimb, Cut, Edit, Radius, Remove, Stretch
 from shapechanger.morphology.spec.geometry import axis_ends, orientation, rotation
 from tests.morphology.models import built, gantry, leg, limb, mass, spec_of
 
@@ -144,9 +144,21 @@ def test_children_move_along_with_a_stretch() -> None:
     np.testing.assert_allclose(rig.joint("pitch").pos, held + 2.0 * ([0.0, 0.2, 0.1] - held))
 
 
-@pytest.mark.parametrize("edit", [Stretch("link", 2.0), Radius("link", 2.0), Cut("link", 0.5)])
-def test_meshes_and_explicit_inertias_prevent_reshaping(edit: Stretch | Radius | Cut) -> None:
-    with pytest.raises(MorphologyError, match="'link' holds 'horn', a mesh; only spheres, caps"):
+@pytest.mark.parametrize(
+    "edit",
+    [
+        *(Stretch("link", 2.0), Radius("link", 2.0), Cut("link", 0.5)),
+        *(AddLimb("link", "_2", 1.0, size=2.0), Remove("link").partly(0.5)),
+    ],
+)
+def test_meshes_and_explicit_inertias_prevent_reshaping(edit: Edit) -> None:
+    """A limb with one can be removed."""
+    with pytest.raises(
+        MorphologyError, match=r"'link\w*' holds 'horn\w*', a mesh; only spheres, caps"
+    ):
         built(spec_of(_MESH), edit)
-    with pytest.raises(MorphologyError, match="'link' has its inertia written out, so it would n"):
+    with pytest.raises(
+        MorphologyError, match=r"'link\w*' has its inertia written out, so it would n"
+    ):
         built(limb(_WRITTEN_OUT), edit)
+    assert built(spec_of(_MESH), Remove("link")).nbody == 2

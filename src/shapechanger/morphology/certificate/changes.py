@@ -90,7 +90,6 @@ def grouped(changes: Iterable[Change]) -> list[str]:
 
 
 def _shown(values: Values | None, digits: str, unit: str) -> str:
-    """Format values with a format of numbers; equal numbers of a list are shown once."""
     if not values:
         return "none"
     texts = [value if isinstance(value, str) else f"{value:{digits}}" for value in values]
@@ -101,7 +100,7 @@ def _shown(values: Values | None, digits: str, unit: str) -> str:
 
 def _times(before: Values, after: Values) -> str:
     """Format new over old, if it is the same for all numbers that are not zero in both."""
-    if len(before) != len(after) or not all(map(_is_finite, (*before, *after))):
+    if len(before) != len(after) or len(_finite((*before, *after))) != 2 * len(before):
         return ""
     old, new = np.array(before, float), np.array(after, float)
     used = old != 0.0
@@ -111,10 +110,6 @@ def _times(before: Values, after: Values) -> str:
     if not same or np.any(used != (new != 0.0)) or f"{ratios[0]:.3g}" == "1":
         return ""
     return f" (x{ratios[0]:.3g})"
-
-
-def _is_finite(value: float | str) -> bool:
-    return not isinstance(value, str) and math.isfinite(value)
 
 
 def compare(
@@ -137,8 +132,8 @@ def compare(
     robot: list[_Row] = [("standing height", "robot", *standing_height, "m")]
     one, two = moved_numbers(source), moved_numbers(target)
     found, measured = list[Change](), set[str]()
-    for section, fields in MOVED.items():
-        found += _differences(section, fields, one[section], two[section])
+    for section in MOVED:
+        found += _differences(section, one[section], two[section])
     derived = [
         Change("derived constant", name, fields["values"], two["derived"][name]["values"])
         for name, fields in one["derived"].items()
@@ -187,10 +182,7 @@ def _lengths(
     return found, measured
 
 
-def _differences(
-    section: str, fields: dict[str, Field], before: _Elements, after: _Elements
-) -> list[Change]:
-    """Return the differences within one section, element by element."""
+def _differences(section: str, before: _Elements, after: _Elements) -> list[Change]:
     found, scales = list[Change](), _scales(before, after)
     for element in dict.fromkeys((*before, *after)):
         old, new = before.get(element), after.get(element)
@@ -203,7 +195,7 @@ def _differences(
             continue
         for quantity in dict.fromkeys((*old, *new)):
             if not _equal(old.get(quantity), new.get(quantity), scales[quantity]):
-                field = fields.get(quantity, Field(""))
+                field = MOVED[section].get(quantity, Field(""))
                 found.append(_difference(quantity, field, element, old, new))
     old_order = tuple(name for name in before if name in after)
     new_order = tuple(name for name in after if name in before)
@@ -215,7 +207,6 @@ def _differences(
 def _difference(
     quantity: str, field: Field, element: str, before: dict[str, Values], after: dict[str, Values]
 ) -> Change:
-    """Describe a quantity that differs, in its usual unit."""
     old, new, unit = before.get(quantity), after.get(quantity), field.unit
     if field.padded and old is not None and new is not None:
         used = [i for values in (old, new) for i, value in enumerate(values) if value != 0.0]
@@ -236,9 +227,13 @@ def _scales(*sections: _Elements) -> dict[str, float]:
     return found
 
 
+def _finite(values: Iterable[float | str]) -> list[float]:
+    return [float(x) for x in values if not isinstance(x, str) and math.isfinite(x)]
+
+
 def _largest(values: Iterable[float | str]) -> float:
     """Return the largest magnitude of the finite numbers; 0 without any."""
-    return max((abs(float(value)) for value in values if _is_finite(value)), default=0.0)
+    return max(map(abs, _finite(values)), default=0.0)
 
 
 def _equal(before: Values | None, after: Values | None, scale: float = 0.0) -> bool:
@@ -287,6 +282,5 @@ def _rounded(values: Values, scale: float) -> Values:
     largest = max(_largest(values), _NOISE / 10.0 ** (1 - _ROUNDED_TO) * scale) * (1.0 + ROUNDING)
     places = _ROUNDED_TO - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
     return tuple(
-        round(value, places) + 0.0 if not isinstance(value, str) and _is_finite(value) else value
-        for value in values
+        round(x, places) + 0.0 if not isinstance(x, str) and math.isfinite(x) else x for x in values
     )

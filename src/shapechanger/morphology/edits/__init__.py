@@ -144,12 +144,6 @@ def part_of_the_way(old: _N, new: _N, amount: float) -> _N:
     return new if amount == 1.0 else old + amount * (new - old)
 
 
-def require_gear(gear: float | None) -> None:
-    """Refuse a gear of zero, with which a motor has no effect."""
-    if gear == 0.0:
-        raise MorphologyError(f"A motor needs a gear that is not zero, got {gear}.")
-
-
 # They subclass `Edit`.
 for _module in pkgutil.iter_modules(__path__, f"{__name__}."):
     importlib.import_module(_module.name)

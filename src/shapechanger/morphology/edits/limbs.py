@@ -14,15 +14,8 @@ import numpy as np
 from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits import (
-    Edit,
-    Positive,
-    Ratio,
-    Vector,
-    part_of_the_way,
-    require_gear,
-)
-from shapechanger.morphology.edits.values import scale_strength
+from shapechanger.morphology.edits import Edit, Positive, Ratio, Vector, part_of_the_way
+from shapechanger.morphology.edits.values import require_gear, scale_strength
 from shapechanger.morphology.spec import (
     LEAST_MASS,
     copy_element,
@@ -194,8 +187,8 @@ class Cut(Edit, frozen=True):
             share = part_of_the_way(1.0, self.keep, self.amount)
             for child in plane.children:
                 if self.amount < 1.0:
-                    there = geometry.held_at(child)
-                    child.pos += geometry.stretched(there, geometry.anchor(body), share) - there
+                    there, held = geometry.held_at(child), geometry.anchor(body)
+                    child.pos += held + share * (there - held) - there
                 _take_away(spec, child, self.amount)
             for point in plane.points:
                 if plane.is_at_end(point):

@@ -14,17 +14,17 @@ import numpy as np
 from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits import Edit, Ratio, Vector, part_of_the_way, require_gear
+from shapechanger.morphology.edits import Edit, Ratio, Vector, part_of_the_way
 from shapechanger.morphology.pose import robot_bodies
 from shapechanger.morphology.spec import compiled, geometry, references, select
 
 _D: Final = mujoco.mjtDisableBit
 _GAIN: Final = mujoco.mjtGain
 _BIAS: Final = mujoco.mjtBias
-_LINEAR: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE), (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE)
-# A larger value, in any unit here, is a typing mistake, and MuJoCo's numbers overflow.
+_LINEAR: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE, _BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE)
+# Larger values are typing mistakes: in any unit here MuJoCo's numbers overflow, and gravity would
+# be ten times that at Jupiter's cloud tops (24.8 m/s²).
 _LARGEST: Final = 1e6
-# Ten times the gravity at Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
 _LARGEST_GRAVITY: Final = 250.0
 
 
@@ -155,6 +155,12 @@ class Gear(ValueEdit, frozen=True):
                 element.actfrcrange *= abs(scales.pop())
 
 
+def require_gear(gear: float | None) -> None:
+    """Refuse a gear of zero, with which a motor has no effect."""
+    if gear == 0.0:
+        raise MorphologyError(f"A motor needs a gear that is not zero, got {gear}.")
+
+
 def _is_motor(actuator: mujoco.MjsActuator) -> bool:
     """Return whether the force does not depend on where the actuator is: gain times control."""
     return actuator.gaintype == _GAIN.mjGAIN_FIXED and actuator.biastype == _BIAS.mjBIAS_NONE
@@ -173,7 +179,7 @@ def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
         # The peak force, or the values that it is derived from if it is negative.
         for force in (actuator.gainprm[2:4], actuator.biasprm[2:4]):
             force[force > 0.0] *= factor
-    elif actuator.gaintype in _LINEAR[0] and actuator.biastype in _LINEAR[1]:
+    elif actuator.gaintype in _LINEAR and actuator.biastype in _LINEAR:
         # Constant, length and velocity terms.
         actuator.gainprm[:3] *= factor
         actuator.biasprm[:3] *= factor
@@ -298,10 +304,8 @@ class Gravity(Edit, frozen=True):
 
     def check(self) -> None:
         """Refuse one that is out of range."""
-        if math.hypot(*self.to) > _LARGEST_GRAVITY:
-            raise MorphologyError(
-                f"Gravity is at most {_LARGEST_GRAVITY:g} m/s², got {math.hypot(*self.to):g}."
-            )
+        if (size := math.hypot(*self.to)) > _LARGEST_GRAVITY:
+            raise MorphologyError(f"Gravity is at most {_LARGEST_GRAVITY:g} m/s², got {size:g}.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Set the model's gravity."""

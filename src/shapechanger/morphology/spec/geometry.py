@@ -29,8 +29,7 @@ _QUAT: Final = mujoco.mjtOrientation.mjORIENTATION_QUAT
 _RESOLVER: Final = mujoco.MjSpec()
 # A joint without limits turns all the way round; a slide without limits has no such number.
 _FULL_TURN: Final = (-math.pi, math.pi)
-# Cosine above which a geom lies along an axis; the pole of the inverted pendulum leans by 1 mm on
-# 600.
+# Cosine above which a geom lies along an axis; that of the inverted pendulum leans by 1 mm on 600.
 _ALONG: Final = 0.999
 # Shares of a length that differ by less are the same; rounding must not decide on which side of a
 # cut a point lies.
@@ -39,15 +38,13 @@ _SAME: Final = 1e-9
 
 def rotation(quaternion: Array) -> Array:
     """Return the rotation matrix, shape (3, 3), of a quaternion."""
-    matrix = np.empty(9)
-    mujoco.mju_quat2Mat(matrix, quaternion)
+    mujoco.mju_quat2Mat(matrix := np.empty(9), quaternion)
     return matrix.reshape(3, 3)
 
 
 def product(first: Array, second: Array) -> Array:
     """Return the quaternion of a second turn, made in the frame that the first has turned."""
-    result = np.empty(4)
-    mujoco.mju_mulQuat(result, first, second)
+    mujoco.mju_mulQuat(result := np.empty(4), first, second)
     return result
 
 
@@ -59,11 +56,8 @@ def orientation(element: Any, quat: str = "quat", alt: str = "alt") -> Array:
     quaternion, written = getattr(element, quat), getattr(element, alt)
     if written.type == _QUAT:
         return quaternion / np.linalg.norm(quaternion)
-    compiler = element.compiler
-    resolved = _RESOLVER.resolve_orientation(
-        degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=written
-    )
-    return np.array(resolved)
+    degree, sequence = bool(element.compiler.degree), element.compiler.eulerseq
+    return np.array(_RESOLVER.resolve_orientation(degree, sequence, written))
 
 
 def set_orientation(element: Any, quaternion: Array) -> None:
@@ -210,17 +204,12 @@ def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
             )
 
 
-def stretched(points: Array, held: Array, factor: float | Array) -> Array:
-    """Return points of a segment that is `factor` times as long; the point `held` stays.
+def move_outwards(element: Any, held: Array, factor: float | Array) -> None:
+    """Move an element, or its ends, as its segment is stretched; the point `held` stays.
 
     The factor may be one for each axis of the body.
     """
-    return held + factor * (points - held)
-
-
-def move_outwards(element: Any, held: Array, factor: float | Array) -> None:
-    """Move an element, or its ends, as its segment is stretched."""
-    set_points(element, stretched(points_of(element), held, factor))
+    set_points(element, held + factor * (points_of(element) - held))
 
 
 def lengthen(geom: mujoco.MjsGeom, factor: float, axis: int | None) -> None:
@@ -254,8 +243,8 @@ def carry_outwards(body: mujoco.MjsBody, held: Array, factor: float | Array) -> 
     for element in (*body.joints, *body.sites, *mounted):
         move_outwards(element, held, factor)
     for child in body.bodies:
-        held_there = held_at(child)
-        child.pos += stretched(held_there, held, factor) - held_there
+        there = held_at(child)
+        child.pos += held + factor * (there - held) - there
 
 
 def is_limited(element: mujoco.MjsJoint | mujoco.MjsTendon) -> bool:
@@ -354,7 +343,6 @@ class Plane:
         self.points = [point for point in points if self._is_beyond(middle_of(point))]
 
     def _share(self, point: Array) -> float:
-        """Return the position of a point along the segment as a share of its length."""
         return float((point - self._held) @ self.along) / float(self.along @ self.along)
 
     def _is_beyond(self, point: Array) -> bool:

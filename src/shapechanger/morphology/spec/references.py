@@ -6,7 +6,7 @@ that loops hold are sites meanwhile, and keyframes are kept by name (`carried`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
@@ -47,7 +47,7 @@ WRAPS: Final = {
 
 # Lists of elements that name others, their fields with names, and the kind of the named elements
 # or a function that returns it; a tuple has one kind for each name.
-_HOLDERS: Final[tuple[tuple[str, str, Any], ...]] = (
+_HOLDERS: Final[tuple[tuple[str, str, Callable[[Any], Any] | mujoco.mjtObj], ...]] = (
     ("equalities", "name1 name2", lambda e: e.objtype if e.type in PINS else COUPLINGS.get(e.type)),
     ("excludes", "bodyname1 bodyname2", _BODY),
     ("pairs", "geomname1 geomname2", _GEOM),
