@@ -135,7 +135,6 @@ class Mechanism(NamedTuple):
     boundmass: float
 
     def spec(self) -> mujoco.MjSpec:
-        """Return a new specification of the mechanism."""
         cos, sin = np.cos(self.turn), np.sin(self.turn)
 
         def local(x: float, z: float) -> np.ndarray:
@@ -165,7 +164,6 @@ class Mechanism(NamedTuple):
         }
 
         def angles(*values: float) -> str:
-            """Return angles in the unit of the file."""
             return _text(np.degrees(values) if self.in_degrees else np.array(values))
 
         return mujoco.MjSpec.from_string(

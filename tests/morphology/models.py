@@ -153,7 +153,6 @@ def pendulum() -> mujoco.MjSpec:
 
 
 def limb(content: str, compiler: str = "") -> mujoco.MjSpec:
-    """Return a trunk with one limb, `link`, on a hinge, made of `content`."""
     return spec_of(
         f"""<mujoco><compiler {compiler}/><worldbody><body name="trunk"><geom name="trunk"
         type="box" size=".1 .1 .1"/><body name="link" pos="0 0 1"><joint name="link" axis="0 1 0"/>
@@ -162,13 +161,11 @@ def limb(content: str, compiler: str = "") -> mujoco.MjSpec:
 
 
 def arm(rest: str = "", **more: str) -> mujoco.MjSpec:
-    """Return the arm with more elements."""
     parts = dict.fromkeys(("top", "root", "trunk", "joint", "upper", "lower"), "")
     return spec_of(ARM.format(rest=rest, **{**parts, **more}))
 
 
 def spatial(path: str, more: str = "") -> str:
-    """Return a spatial tendon, `rope`."""
     return f'<tendon><spatial name="rope" {more}>{path}</spatial></tendon>'
 
 
@@ -213,7 +210,6 @@ def check_at_rest(model: mujoco.MjModel) -> None:
 
 
 def tip(model: mujoco.MjModel, site: str, angles: dict[str, float] | None = None) -> Array:
-    """Return the position of a site in the world, m."""
     return np.array(posed(model, angles).site(site).xpos)
 
 

@@ -62,14 +62,12 @@ class Swing:
         self._data = mujoco.MjData(self.model)
 
     def reset(self, *, seed: int | None = None) -> tuple[np.ndarray, dict[str, Any]]:
-        """Start at a random angle."""
         mujoco.mj_resetData(self.model, self._data)
         self._data.qpos[0] = np.random.default_rng(seed).uniform(-0.1, 0.1)
         self.commands = []
         return self._observation(), {}
 
     def step(self, action: Any, /) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Apply an action for ten simulation steps."""
         self.commands.append(action)
         self._data.ctrl[:] = action
         mujoco.mj_step(self.model, self._data, nstep=10)

@@ -67,16 +67,12 @@ def test_unknown_kinds_and_fields_are_refused(kind: object) -> None:
         ({"edit": "stretch", "body": "shin"}, "stretch: .*factor"),
         ({"edit": "stretch", "body": 3, "factor": 2}, "stretch: Expected `str`, got `int`"),
         ({"edit": "stretch", "body": "shin", "factor": 2, "axis": "w"}, "stretch: .*'w'"),
-        ({"edit": "stretch", "body": "shin", "factor": -2}, "stretch: Expected `float` >= 0.01"),
-        ({"edit": "stretch", "body": "shin", "factor": 2, "amount": 2}, "stretch: .* <= 1.0"),
         ({"edit": "gravity", "to": [0, -9.81]}, "gravity: Expected `array` of length 3"),
         ({"edit": "gravity", "to": [0, 0, -300]}, "gravity: Gravity is at most 250"),
         ({"edit": "mass", "element": "*"}, "mass: Mass takes either scale or to"),
-        ({"edit": "split", "body": "a", "name": "b", "at": 1}, "split: Expected `float` < 1.0"),
     ],
 )
 def test_invalid_fields_are_refused(fields: dict[str, Any], message: str) -> None:
-    """The error starts with the kind of edit."""
     with pytest.raises(MorphologyError, match=message):
         from_json(json.dumps(fields))
 
@@ -98,7 +94,6 @@ def test_other_objects_are_refused(value: Any) -> None:
 
 
 def test_edits_are_values() -> None:
-    """Edits compare by value, are hashable and frozen, and print without defaults."""
     edit = Stretch("thigh", 2.0)
     assert edit == Stretch("thigh", 2.0) != Stretch("shin", 2.0)
     assert len({edit, Stretch("thigh", 2.0)}) == 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 
 import mujoco
@@ -94,7 +93,6 @@ def test_common_edits_are_interpolated() -> None:
 
 
 def test_edits_of_one_body_only_fade() -> None:
-    """Edits of the first fade out, those of the second fade in, common ones stay."""
     a = (Mass("*", scale=2.0), Stretch("thigh", 2.0))
     b = (Mass("*", scale=2.0), Stretch("shin", 2.0), Gear("*", scale=3.0))
     assert interpolate(a, b, 0.25) == (
@@ -134,11 +132,6 @@ def _assert_continuous(
             )
 
 
-@pytest.mark.parametrize("pair", [*itertools.combinations(ANT.bodies, 2)], ids="-".join)
-def test_the_ants_change_continuously(pair: tuple[str, str]) -> None:
-    _assert_continuous(ant, ANT.body(pair[0]), ANT.body(pair[1]))
-
-
 @pytest.mark.parametrize("edit", ONE_OF_EACH, ids=lambda edit: type(edit).__name__)
 def test_every_kind_of_edit_is_continuous(edit: Edit) -> None:
     # The rounded ends at a split are displaced.
@@ -148,7 +141,6 @@ def test_every_kind_of_edit_is_continuous(edit: Edit) -> None:
 
 
 def test_two_edits_can_shrink_one_limb() -> None:
-    """The limb is then smaller than 0.01, and still compiles."""
     grown = (AddSegment("shin", "foot", (0.1, 0.0, 0.0)), AddLimb("thigh", "_2", 1.0, size=0.01))
     for alpha in (1e-9, 0.5, 1.0 - 1e-9):
         model = built(leg(), *interpolate(grown, (Remove("thigh"),), alpha))

@@ -33,12 +33,10 @@ _PLANE = '<geom type="plane" size="1 1 1" pos="0 0 .3"/>'
 
 
 def _ball(floor: str, ball: str = "") -> mujoco.MjModel:
-    """Return a ball of 20 cm radius with its centre 1 m above the origin."""
     return built(spec_of(_BALL.format(floor=floor, ball=ball)))
 
 
 def _at(model: mujoco.MjModel, pose: np.ndarray) -> mujoco.MjData:
-    """Return the kinematics of a pose."""
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
@@ -59,7 +57,6 @@ def _at(model: mujoco.MjModel, pose: np.ndarray) -> mujoco.MjData:
     ],
 )
 def test_the_floor_is_the_highest_static_plane(floor: str, gap: float) -> None:
-    """Static planes and height fields count, the highest one wins."""
     model = _ball(floor)
     assert StartRules(model).floor_gap(posed(model)) == pytest.approx(gap)
     assert standing_height(model) == pytest.approx(1.0 - gap)
@@ -126,7 +123,6 @@ _HOPPER = """
 
 
 def _hopper(height: float = 1.0, axis: str = "0 0 1", **parts: object) -> mujoco.MjModel:
-    """Return a ball with a foot 0.5 m below it, on two slides."""
     defaults: dict[str, object] = {"ref": 0.0, "turn": "0 0 0", "limits": ""}
     return built(spec_of(_HOPPER.format(height=height, axis=axis, **(defaults | parts))))
 
@@ -143,7 +139,6 @@ def _hopper(height: float = 1.0, axis: str = "0 0 1", **parts: object) -> mujoco
     ],
 )
 def test_a_slide_raises_a_trunk(axis: str, ref: float, turn: str, lift: Lift) -> None:
-    """Direction and reference of a vertical slide are taken into account."""
     model = _hopper(axis=axis, ref=ref, turn=turn)
     found = trunk_lift(model)
     assert found is not None

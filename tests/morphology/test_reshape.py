@@ -22,8 +22,6 @@ from shapechanger.morphology import (
     Density,
     Edit,
     Gear,
-    JointRange,
-    Lock,
     Mass,
     Remove,
     Split,
@@ -37,13 +35,9 @@ from tests.morphology.scenes import ASSETS, asset_spec
 from tests.morphology.test_path import ONE_OF_EACH
 
 _MISTAKES: list[tuple[Callable[[], mujoco.MjSpec], tuple[Edit, ...]]] = [
-    (leg, (Stretch("thigh", 2.0), Stretch("thgih", 2.0))),
     (leg, (Stretch("thigh", 2.0), Remove("trunk"))),
-    (leg, (Stretch("thigh", 2.0), Split("shin", "thigh"))),
     (leg, (Cut("thigh", 0.5), Gear("knee", scale=2.0))),
-    (leg, (JointRange("knee", lower=1.0),)),
     (leg, (Density("thigh", to=0.0),)),
-    (gantry, (Lock("yaw"), Lock("yaw"))),
     (gantry, (AddLimb("boom", "_2", 1.0), AddLimb("boom", "_2", 1.0))),
 ]
 
@@ -71,7 +65,6 @@ def test_the_given_spec_is_unchanged_after_an_error(
 
 
 def test_edits_with_amount_0_are_skipped() -> None:
-    """Even their names are not looked up."""
     edits = [Stretch("no such body", 2.0, amount=0.0), Remove("trunk", amount=0.0)]
     assert differing(built(leg()), compile_body(leg(), iter(edits))) == []
 
@@ -119,7 +112,6 @@ def _limbs(spec: mujoco.MjSpec) -> list[str]:
 
 @pytest.mark.parametrize("model", _MODELS)
 def test_all_names_are_unique(model: str) -> None:
-    """Naming does not change the model."""
     spec = _named(model)
     for elements in _ELEMENTS:
         names = [element.name for element in getattr(spec, elements)]
@@ -131,7 +123,6 @@ def test_all_names_are_unique(model: str) -> None:
 
 @pytest.mark.parametrize("model", _MODELS)
 def test_every_limb_can_be_removed_copied_cut_split_and_extended(model: str) -> None:
-    """The total mass changes as expected."""
     spec = _named(model)
     before = _before(model)
     for limb in _limbs(spec):

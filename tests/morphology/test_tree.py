@@ -356,7 +356,6 @@ def test_objects_neither_carry_the_robot_nor_move() -> None:
 
 
 def test_a_joint_that_its_damping_locks_is_at_rest() -> None:
-    """MuJoCo diverges unless it is."""
     locked = _WALKER.replace('name="leg" axis', 'name="leg" damping="1e11" axis')
     rules = StartRules(mujoco.MjModel.from_xml_string(locked))
     assert rules.robot_dofs.sum() == 6

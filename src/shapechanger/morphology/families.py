@@ -173,9 +173,7 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
     """Compile a copy of a specification with edits applied in order.
 
     Raises:
-        UnknownName: If an edit names an element that the model lacks.
-        MorphologyError: If an element cannot be changed that way.
-        BrokenModel: If MuJoCo does not compile the result.
+        MorphologyError: As of `reshape`; a `BrokenModel` if MuJoCo does not compile the result.
     """
     body = tuple(edits)
     try:
@@ -326,13 +324,9 @@ class Family:
         """
         if split not in get_args(Split):
             raise UnknownName("split", split, get_args(Split))
-        if not self.axes:
-            raise MorphologyError(f"The family {self.name} declares no axes to draw bodies from.")
-        if split == "composition" and len(self.parts) < 2:
-            raise MorphologyError(
-                f"The family {self.name} has no parts to combine: its splits are "
-                f"{', '.join(get_args(Split)[:3])}."
-            )
+        if not self.axes or (split == "composition" and len(self.parts) < 2):
+            missing = "parts at two places" if self.axes else "axes"
+            raise MorphologyError(f"The family {self.name} declares no {missing} to draw from.")
         rng = np.random.default_rng([seed, get_args(Split).index(split)])
         return [self._draw(rng, split) for _ in range(n)]
 

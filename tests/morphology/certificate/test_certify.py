@@ -124,12 +124,6 @@ def test_an_edit_that_changes_only_the_rounding_is_empty(edit: Edit) -> None:
     assert certificate.changes == ()
 
 
-def test_a_small_change_is_a_shift() -> None:
-    target = gymnasium.make("shapechanger/HalfCheetah-v1", body=Mass("torso", scale=1.000001))
-    certificate = certify(gymnasium.make("shapechanger/HalfCheetah-v1"), target)
-    assert "mass" in {change.quantity for change in certificate.changes}
-
-
 @pytest.mark.parametrize("wrapped", [lambda env: env, dictionary, broken])
 @pytest.mark.parametrize("steps", [0, 20])
 def test_equal_environments_have_equal_rollouts(wrapped: Any, steps: int) -> None:
@@ -194,7 +188,6 @@ def test_motors_of_the_same_name_get_the_same_commands() -> None:
     ],
 )
 def test_each_difference_is_a_sentence(source: Any, target: Any, steps: int, sentence: str) -> None:
-    """None of them is rounding."""
     rollout = compare_rollouts(source(), target(), steps=20)
     assert rollout.steps == steps
     assert not rollout.identical
@@ -207,7 +200,6 @@ def test_equal_ends_of_equal_episodes_are_equal() -> None:
 
 
 def test_without_common_features_rollouts_differ() -> None:
-    """A block has a name per number."""
     target = Swing()
     target.observation_layout = Layout((Feature("block", "1", shape=(2, 1)),))
     rollout = compare_rollouts(Swing(), target, steps=5)
@@ -258,8 +250,6 @@ def test_a_late_shift_is_no_rounding(after: int) -> None:
 
 
 def test_another_end_of_the_episode_is_no_rounding() -> None:
-    """Equal numbers with another end differ in what the episode is."""
-
     class _Ends(Wrapper):
         def step(self, action: object, /) -> object:  # type: ignore[override]
             observation, reward, _, *rest = self.env.step(action)

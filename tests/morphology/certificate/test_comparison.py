@@ -22,14 +22,12 @@ def _edited(edit: Callable[[mujoco.MjSpec], object], name: str = "ant") -> mujoc
 
 
 def _longer(spec: mujoco.MjSpec) -> None:
-    """Double all four shanks, as in the 2017 release."""
     for geom in spec.geoms:
         if "ankle" in geom.name:
             geom.fromto = 2.0 * geom.fromto
 
 
 def _extend(spec: mujoco.MjSpec) -> None:
-    """Add a foot with a toe and a motor."""
     foot = spec.body("aux_1").bodies[0].add_body(name="foot", pos=[0.4, 0.4, 0])
     foot.add_joint(name="toe", axis=[0, 0, 1], range=[-10, 10])
     foot.add_geom(name="foot", size=[0.05, 0, 0], mass=0.5)

@@ -35,14 +35,12 @@ _SCENE = """
 
 
 def _scene(**parts: str) -> mujoco.MjModel:
-    """Return a ball that penetrates the floor, with optional attributes and neighbours."""
     names = ("assets", "option", "floor", "ball", "children", "bodies", "contact")
     defaults = dict.fromkeys(names, "") | {"flag": "contact='enable'"}
     return mujoco.MjModel.from_xml_string(_SCENE.format(**(defaults | parts)))
 
 
 def _simulated(model: mujoco.MjModel) -> dict[str, list[mujoco.MjContact]]:
-    """Return MuJoCo's contacts in the start pose, by the names of the geoms."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     found: dict[str, list[mujoco.MjContact]] = {}
@@ -73,7 +71,6 @@ def _assert_equal(ours: _Contact, theirs: mujoco.MjContact) -> None:
 
 
 def _random_geom(random: np.random.Generator, name: str) -> str:
-    """Return a geom of random shape with random contact parameters."""
     shape = str(random.choice(list(_SHAPES)))
     solref = random.uniform(0.01, 0.05), random.uniform(0.5, 2.0)
     if random.random() < 0.3:
@@ -144,7 +141,6 @@ def test_contact_pairs_are_those_of_mujoco(seed: int, flag: str) -> None:
 
 
 def test_the_override_replaces_all_but_dimension_gap_and_adhesion() -> None:
-    """With the flag set, the geoms' own parameters do not count."""
     option = "o_margin='.1' o_solref='.05 3' o_solimp='.8 .9 .01 .5 2' o_friction='.1 .2 .3 .4 0'"
     model = _scene(
         option=option,

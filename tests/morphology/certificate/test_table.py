@@ -88,7 +88,6 @@ def _array(model: mujoco.MjModel, name: str) -> Any:
 
 
 def _write(model: mujoco.MjModel, field: Field, rows: Any = slice(None)) -> None:
-    """Change the numbers of a field in some rows."""
     new = np.array(_array(model, field.array))
     if field.array.startswith("opt_") and new.ndim == 0:
         setattr(model.opt, field.array.removeprefix("opt_"), new * 1.1 if new % 1 else new + 1)
@@ -315,7 +314,6 @@ _PID = """<mujoco>
 def test_switches_and_what_is_rare_counts(
     text: str, write: Callable[[mujoco.MjModel], object]
 ) -> None:
-    """What few models have counts as a whole."""
     nominal, written = (mujoco.MjModel.from_xml_string(text) for _ in range(2))
     write(written)
     assert fingerprint(written) != fingerprint(nominal)

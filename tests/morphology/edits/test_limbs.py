@@ -18,9 +18,6 @@ def _bodies(model: mujoco.MjModel) -> list[str]:
     return [model.body(i).name for i in range(1, model.nbody)]
 
 
-# --- Cut ---------------------------------------------------------------------------------------
-
-
 def test_children_beyond_a_cut_are_removed() -> None:
     """Joints and motors are removed too; a child exactly at the cut stays."""
     cut = built(leg(), Cut("thigh", 0.99))
@@ -32,7 +29,6 @@ def test_children_beyond_a_cut_are_removed() -> None:
 
 
 def test_a_cut_leaves_something() -> None:
-    """A segment whose geoms all lie beyond the cut would have no mass."""
     spec = arm()
     spec.geom("lower").fromto = [0.3, 0.0, 0.0, 0.4, 0.0, 0.0]
     with pytest.raises(MorphologyError, match=r"No geom of 'lower' lies nearer than 0\.5 of its"):
@@ -48,15 +44,9 @@ def test_a_partial_cut_shrinks_what_goes() -> None:
     np.testing.assert_allclose(half.site("end").pos, [0.3, 0.0, 0.0])
 
 
-# --- Remove ------------------------------------------------------------------------------------
-
-
 def test_a_glob_removes_parents_and_children_once() -> None:
     assert _bodies(built(leg(), Remove("s*"))) == ["trunk", "thigh"]
     assert _bodies(built(leg(), Remove("[ts]hi*"))) == ["trunk"]
-
-
-# --- Split -------------------------------------------------------------------------------------
 
 
 def test_a_split_gives_two_segments() -> None:
@@ -111,7 +101,6 @@ def test_a_box_is_cut_along_the_segment(turned: str, written: str) -> None:
 
 
 def test_a_geom_beside_the_axis_is_divided_where_it_is() -> None:
-    """Its farther half stays in line with the nearer one."""
     spec = arm(lower='<geom name="rib" type="capsule" fromto="0 .05 0 .3 .05 0" size=".01"/>')
     data = posed(built(spec, Split("lower", "far", 0.25)))
     np.testing.assert_allclose(data.geom("rib").xpos, [0.55, 0.05, 1.0], atol=1e-12)
@@ -130,9 +119,6 @@ def test_used_names_are_refused(name: str) -> None:
     spec.geom("thigh_of_shin_1").name = "shin_1_geom"
     with pytest.raises(MorphologyError, match=r"A new \w+ needs an unused name, got '\w*'"):
         built(spec, AddSegment("thigh", name, (0.0, 0.0, 1.0)))
-
-
-# --- AddSegment --------------------------------------------------------------------------------
 
 
 def test_a_segment_grows_at_the_far_end() -> None:
@@ -177,9 +163,6 @@ def test_a_body_without_hinge_needs_an_axis() -> None:
         built(spec, AddSegment("b", "tail", (0.0, 0.0, 1.0)))
     model = built(spec, AddSegment("b", "tail", (0.0, 0.0, 1.0), axis=(1.0, 0.0, 0.0)))
     assert model.joint("tail").type == mujoco.mjtJoint.mjJNT_HINGE
-
-
-# --- AddLimb -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

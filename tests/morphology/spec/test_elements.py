@@ -103,7 +103,6 @@ _FRAMES = """
 
 
 def test_frames_are_resolved() -> None:
-    """Poses become relative to the body, and the compiled model does not change."""
     spec = spec_of(_FRAMES)
     before = built(spec)
     resolve_frames(spec)
@@ -151,7 +150,6 @@ def test_a_total_mass_does_not_undo_an_edit() -> None:
 
 
 def test_least_masses_do_not_swallow_an_edit() -> None:
-    """They are written out, and bind nothing any more."""
     spec = arm(top='<compiler boundmass="1" boundinertia=".1"/>')
     before = built(spec)
     after = built(spec, Mass("other", to=0.3))
@@ -243,7 +241,6 @@ def test_limbs_of_attached_models_keep_their_units() -> None:
 
 
 def test_a_plugin_cannot_be_copied() -> None:
-    """Its state belongs to one element."""
     spec = arm()
     spec.activate_plugin("mujoco.pid")
     plugin = spec.add_plugin(name="pid", plugin_name="mujoco.pid", active=True)

@@ -80,7 +80,6 @@ def _sizes(content: str, edit: Stretch | Radius) -> list[float]:
     ],
 )
 def test_stretches_apply_along_the_axis(content: str, axis: str | None, sizes: list[float]) -> None:
-    """A box stretches along any of its axes, a capsule along one."""
     edit = Stretch("link", 2.0, axis)  # type: ignore[arg-type]
     np.testing.assert_allclose(_sizes(content, edit), sizes, atol=1e-12)
 
@@ -106,8 +105,6 @@ def test_the_longest_side_is_the_length(content: str, sizes: list[float]) -> Non
     """`Radius` scales the other two half-sizes."""
     np.testing.assert_allclose(_sizes(content, Radius("link", 3.0)), sizes)
 
-
-# --- Segments ----------------------------------------------------------------------------------
 
 _MESH = """
 <mujoco>

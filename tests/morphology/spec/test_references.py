@@ -154,8 +154,6 @@ def test_an_edit_refuses_what_it_cannot_carry(
         built(spec, edit)
 
 
-# --- Joints that are locked --------------------------------------------------------------------
-
 _TWO_SUMS = """
 <tendon>
   <fixed name="a"><joint joint="upper" coef="2"/></fixed>
@@ -246,8 +244,6 @@ def test_a_tendon_with_effect_prevents_the_lock(tendon: str, rest: str) -> None:
         built(spec, Lock("b", 0.1))
 
 
-# --- Flexes and tuples -------------------------------------------------------------------------
-
 _CLOTH = """<deformable><flex name="cloth" dim="1" body="lower other" vertex="0 0 0 0 0 0"
   element="0 1"/></deformable>"""
 
@@ -257,7 +253,6 @@ _CLOTH = """<deformable><flex name="cloth" dim="1" body="lower other" vertex="0 
     [Stretch("lower", 1.5), Radius("other", 2.0), Remove("upper"), AddLimb("lower", "_2", 1.0)],
 )
 def test_a_flex_is_not_torn(edit: Edit) -> None:
-    """Its vertices belong to several bodies."""
     with pytest.raises(MorphologyError, match=r"carries a part of the flex 'cloth', which would"):
         built(arm(_CLOTH), edit)
 
@@ -273,7 +268,6 @@ def test_a_tuple_loses_what_is_removed() -> None:
 
 
 def test_cameras_and_lights_look_at_the_parent_of_a_removed_limb() -> None:
-    """What they were aimed at is gone."""
     spec = mujoco.MjSpec.from_string(
         """<mujoco><worldbody>
         <body name="trunk"><geom size="0.1"/>
@@ -323,7 +317,6 @@ def test_a_pin_that_is_switched_off_keeps_both_places() -> None:
 
 
 def test_an_open_equality_stays_as_open_as_it_was() -> None:
-    """A model that starts torn is not changed behind the user's back."""
     torn = '<equality><joint joint1="lower" joint2="upper" polycoef=".3 1 0 0 0"/></equality>'
     model = built(arm(torn), Mass("lower", scale=2.0))
     np.testing.assert_array_equal(model.qpos0, 0.0)

@@ -286,7 +286,6 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
 
 
 def _layout(env: Any, side: str) -> Layout:
-    """Return the layout of actions or observations of an env, or of the one inside its wrappers."""
     name = f"{side}_layout"
     return getattr(env if hasattr(env, name) else env.unwrapped, name)
 

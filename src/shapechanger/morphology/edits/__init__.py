@@ -32,12 +32,8 @@ Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 EDITS: Final[dict[str, type[Edit]]] = {}
 """The kinds of edits by their names in JSON; a subclass of `Edit` with an `apply` enters itself."""
 
-# Modules with kinds of edits that cannot be replaced.
-_SHIPPED: Final = "shapechanger."
-
 
 def _tag(class_name: str) -> str:
-    """Return the tag of an edit in JSON: `add_segment` for `AddSegment`."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", class_name).lower()
 
 
@@ -77,7 +73,7 @@ class Edit(
         tag = _tag(cls.__name__)
         known = EDITS.get(tag, cls)
         # A module that is imported again, perhaps under another name, defines its classes again.
-        ours = known.__module__.startswith(_SHIPPED) and known.__module__ != cls.__module__
+        ours = known.__module__.startswith("shapechanger.") and known.__module__ != cls.__module__
         if ours or known.__qualname__ != cls.__qualname__:
             raise MorphologyError(
                 f"There is an edit {tag!r} already: give {cls.__name__} a new name."

@@ -126,7 +126,6 @@ class AddMotor(Edit, frozen=True):
 
 
 def _add_motor(spec: mujoco.MjSpec, name: str, gear: float) -> None:
-    """Add a motor to the joint of its name; its gear is the N·m or N for a control of 1."""
     require_free_name(spec, "actuator", name)
     motor = spec.add_actuator(
         name=name,
@@ -199,7 +198,6 @@ class Cut(Edit, frozen=True):
                     spec.delete(point)
 
     def _cut_geoms(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, plane: geometry.Plane) -> None:
-        """Shorten the geoms that the plane cuts, and remove those that lie beyond it."""
         pieces = [(geom, plane.piece_of(geom)) for geom in body.geoms]
         if not any(piece.share for _, piece in pieces):
             raise MorphologyError(
@@ -234,7 +232,6 @@ class Remove(Edit, frozen=True):
 
 
 def _check_hinge(edit: Split | AddSegment) -> None:
-    """Refuse a hinge that MuJoCo would refuse."""
     if not edit.lower < edit.upper:
         raise MorphologyError(
             f"A hinge needs a lower limit below its upper one, got {edit.lower}, {edit.upper}."
@@ -439,7 +436,6 @@ def _resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> No
 
 
 def _scale_resistance(element: Any, factor: float) -> None:
-    """Scale the armature, damping, stiffness and friction of a joint or tendon."""
     for field in _RESISTANCE:
         setattr(element, field, getattr(element, field) * factor)
 

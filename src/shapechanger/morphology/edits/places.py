@@ -24,10 +24,6 @@ _J: Final = mujoco.mjtJoint
 _ROUND: Final = (_G.mjGEOM_SPHERE, *geometry.LONG)
 # Share of an axis that is vertical from which a slide raises its body.
 _VERTICAL: Final = 1.0 - 1e-6
-# MuJoCo's default friction of a geom: torsional and rolling, m.
-_TORSIONAL: Final = 0.005
-_ROLLING: Final = 0.0001
-_FLOOR_GRID_M: Final = 0.05
 
 
 class Stretch(Edit, frozen=True):
@@ -114,15 +110,15 @@ class PlaceGeom(Edit, frozen=True):
     radius: Positive | None = None
 
     def check(self) -> None:
-        """Refuse one end alone, ends together with a middle, equal ends, and no change at all."""
-        one = self.start is not None or self.end is not None
-        both = self.start is not None and self.end is not None and self.start != self.end
-        if one and (not both or self.middle is not None):
+        """Refuse one end, ends with a middle, equal ends, and no change at all."""
+        valid = self.middle is not None or self.radius is not None
+        if self.start is not None or self.end is not None:
+            valid = None not in (self.start, self.end) and self.start != self.end
+            valid &= self.middle is None
+        if not valid:
             raise MorphologyError(
-                f"A geom is placed by two different ends or by its middle, got {self}."
+                f"PlaceGeom takes two different ends or a middle, a radius, or both, got {self}."
             )
-        if not one and self.middle is None and self.radius is None:
-            raise MorphologyError(f"PlaceGeom takes two ends, a middle or a radius, got {self}.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every geom that fits."""
@@ -177,7 +173,6 @@ class PlaceBody(Edit, frozen=True):
                 keyframes.change(joint.name, self._placed)
 
     def _placed(self, pose: np.ndarray) -> np.ndarray:
-        """Return a position that begins with x, y and z, at the new place."""
         place = part_of_the_way(pose[:3], np.array(self.to, float), self.amount)
         return np.concatenate([place, pose[3:]])
 
@@ -212,7 +207,6 @@ class StartHeight(Edit, frozen=True):
                 keyframes.change(joint.name, lambda old, own=own: old + self.amount * (own - old))
 
     def _raised(self, pose: np.ndarray) -> np.ndarray:
-        """Return a position that begins with x, y and z, at the new height."""
         height = part_of_the_way(float(pose[2]), self.to, self.amount)
         return np.concatenate([pose[:2], [height], pose[3:]])
 
@@ -235,8 +229,8 @@ class AddFloor(Edit, frozen=True):
             name="floor",
             type=_G.mjGEOM_PLANE,
             pos=[0.0, 0.0, self.height],
-            size=[0.0, 0.0, _FLOOR_GRID_M],
-            friction=[self.friction, _TORSIONAL, _ROLLING],
+            size=[0.0, 0.0, 0.05],  # The grid that is drawn, m.
+            friction=[self.friction, 0.005, 0.0001],  # The last two are MuJoCo's defaults, m.
             contype=1,
             conaffinity=1,
         )
