@@ -104,35 +104,20 @@ _TEXT = """
 
 
 class Mechanism(NamedTuple):
-    """Numbers that the mechanism follows from.
+    """Numbers that the mechanism follows from."""
 
-    Attributes:
-        crank: Its end in the plane of motion, x and z, m.
-        coupler: Its end from that of the crank, x and z, m.
-        rocker: Its end from its hinge, x and z, m.
-        pin: Place of the pin on the coupler as a share of its length.
-        tool: Place of the tool on the coupler as a share of its length.
-        turn: Turn of the crank's frame, rad.
-        slope: Slope of the coupling of both fingers.
-        curve: Its quadratic coefficient.
-        form: How the pin is written: "anchor", "reversed", "sites" or "weld".
-        floats: Whether the base is free.
-        in_degrees: Whether angles are written in degrees.
-        boundmass: The compiler's least mass, kg.
-    """
-
-    crank: tuple[float, float]
-    coupler: tuple[float, float]
-    rocker: tuple[float, float]
-    pin: float
-    tool: float
-    turn: float
-    slope: float
-    curve: float
-    form: str
-    floats: bool
-    in_degrees: bool
-    boundmass: float
+    crank: tuple[float, float]  # Its end in the plane of motion, x and z, m.
+    coupler: tuple[float, float]  # Its end from that of the crank, x and z, m.
+    rocker: tuple[float, float]  # Its end from its hinge, x and z, m.
+    pin: float  # Place of the pin on the coupler as a share of its length.
+    tool: float  # Place of the tool on the coupler as a share of its length.
+    turn: float  # Turn of the crank's frame, rad.
+    slope: float  # Slope of the coupling of both fingers.
+    curve: float  # Its quadratic coefficient.
+    form: str  # How the pin is written: "anchor", "reversed", "sites" or "weld".
+    floats: bool  # Whether the base is free.
+    in_degrees: bool  # Whether angles are written in degrees.
+    boundmass: float  # The compiler's least mass, kg.
 
     def spec(self) -> mujoco.MjSpec:
         cos, sin = np.cos(self.turn), np.sin(self.turn)

@@ -33,8 +33,7 @@ Body = tuple[Edit, ...]
 # MuJoCo takes sparse constraint Jacobians from 60 degrees of freedom on. Newton's solver of this
 # version then factorises a wrong Hessian, which 4.0.1 mends (google-deepmind/mujoco#3767).
 _WRONG_SPARSE: Final = "4.0.0"
-# Share of the training bodies that have one of the family's parts.
-_WITH_PART: Final = 0.5
+_WITH_PART: Final = 0.5  # Share of the training bodies that have one of the family's parts.
 
 
 def to_json(body: Iterable[Edit]) -> str:

@@ -305,10 +305,7 @@ def _gaps(before: _Floats, after: _Floats) -> tuple[_Floats, _Floats]:
 
 
 def _drive(env: Any, commands: NDArray[np.float32], seed: int) -> tuple[_Floats, bool]:
-    """Return observations with the reward as last number, (steps + 1, size + 1), and the end.
-
-    The reward of the reset is 0.
-    """
+    """Return observations with the reward, of the reset 0, (steps + 1, size + 1), and the end."""
     observation, _ = env.reset(seed=seed)
     rows, ended = [np.append(_flat(observation), 0.0)], False
     for command in commands:

@@ -41,12 +41,9 @@ _FIELDS: Final = {
     **{field: field for field in ("qpos", "qvel", "act", "ctrl")},
     **{"mpos": "mocap_pos", "mquat": "mocap_quat"},
 }
-# A tendon that is longer than its limit by less is within it, m or rad.
-_WITHIN: Final = 1e-6
-# Points of a closed loop coincide within this, m.
-_TOGETHER: Final = 1e-8
-# A joint that moves less has not moved, rad or m.
-_STILL: Final = 1e-12
+_WITHIN: Final = 1e-6  # A tendon that is longer than its limit by less is within it, m or rad.
+_TOGETHER: Final = 1e-8  # Points of a closed loop coincide within this, m.
+_STILL: Final = 1e-12  # A joint that moves less has not moved, rad or m.
 CLOSED: Final = 1e-9
 """Residual of an equality that is closed, m or rad; above the rounding of a compiled model."""
 SINGULAR: Final = 1e-6
@@ -56,8 +53,7 @@ SINGULAR: Final = 1e-6
 _SOLVED: Final = [
     int(kind) for kind in (_E.mjEQ_CONNECT, _E.mjEQ_WELD, _E.mjEQ_JOINT, _E.mjEQ_TENDON)
 ]
-# A longer step, rad or m, can jump to another way to assemble the loop.
-_LONGEST_STEP: Final = 0.2
+_LONGEST_STEP: Final = 0.2  # A longer step, rad or m, can jump to another way to assemble the loop.
 _UNLIMITED: Final = np.array([[-np.inf], [np.inf]])
 
 

@@ -25,8 +25,7 @@ UPRIGHT: Final = np.array([1.0, 0.0, 0.0, 0.0])
 OPPOSITE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 """Factors that make the quaternion of the opposite turn."""
 _QUAT: Final = mujoco.mjtOrientation.mjORIENTATION_QUAT
-# The method needs any specification, even an empty one.
-_RESOLVER: Final = mujoco.MjSpec()
+_RESOLVER: Final = mujoco.MjSpec()  # The method needs any specification, even an empty one.
 # A joint without limits turns all the way round; a slide without limits has no such number.
 _FULL_TURN: Final = (-math.pi, math.pi)
 # Cosine above which a geom lies along an axis; that of the inverted pendulum leans by 1 mm on 600.
@@ -213,9 +212,9 @@ def move_outwards(element: Any, held: Array, factor: float | Array) -> None:
 
 
 def lengthen(geom: mujoco.MjsGeom, factor: float, axis: int | None) -> None:
-    """Scale the long half-size of a geom that is given by position and size.
+    """Scale the long half-size of a geom, or that along an axis of the body; refuse oblique ones.
 
-    It is the one along an axis of the body, if given; an oblique geom is refused.
+    A geom that is given by its ends has none.
     """
     if geom.type == _G.mjGEOM_SPHERE or has_ends(geom):
         return  # A sphere has no length.
@@ -295,10 +294,7 @@ def as_written(joint: mujoco.MjsJoint, position: float) -> float:
 
 
 def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
-    """Change the pose of a joint's body as if the joint had moved by an angle, rad, or a distance.
-
-    For a ball joint it is the turn as a quaternion (w, x, y, z).
-    """
+    """Move a joint's body as if the joint had moved, by rad, m, or for a ball by a quaternion."""
     body, quaternion = joint.parent, UPRIGHT.copy()
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     if joint.type == _J.mjJNT_BALL:
@@ -390,10 +386,7 @@ class Plane:
 
 
 def shorten(geom: mujoco.MjsGeom, piece: NearPart, share: float) -> None:
-    """Shorten a geom to a share of its length, at the same thickness and density.
-
-    The near end of the piece stays.
-    """
+    """Shorten a geom to a share of its length, at its density; the piece's near end stays."""
     with same_density(geom):
         if not has_ends(geom):
             geom.size[piece.axis] *= share

@@ -159,8 +159,7 @@ def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Elem
     staying = {*path_elements(tendon)} - elements
     if any(kind == _JOINT for kind, _ in staying):
         return False
-    # All points elsewhere are on bodies that are fixed to each other.
-    carriers: set[str] = set()
+    carriers = set[str]()  # If one, all points elsewhere are on bodies fixed to each other.
     for kind, name in staying:
         body = (spec.site(name) if kind == _SITE else spec.geom(name)).parent
         while body.parent is not None and not body.joints:
