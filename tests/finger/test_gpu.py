@@ -100,7 +100,7 @@ def start_alike(worlds: WarpVectorEnv, alone: list[Any], seed: int) -> list[Any]
             begun.append(env.reset(seed=seed, options={**options, "target": target}))
             continue
         env.reset(seed=seed, options=options)
-        env._t = batch.task._times[i]
+        env._t = batch._times[i]
         env._look()
         begun.append((env._observation(env._senses), env._info()))
     return begun
@@ -109,25 +109,24 @@ def start_alike(worlds: WarpVectorEnv, alone: list[Any], seed: int) -> list[Any]
 def copy_states(worlds: WarpVectorEnv, alone: list[Any]) -> None:
     """Put the worlds into the states of CPU envs, of which single precision is left."""
     batch: Any = worlds.batches[0]
-    physics, task = batch, batch.task
     for i, env in enumerate(alone):
         data = env.plant.data
         for name in ("qpos", "qvel", "act", "ctrl", "history"):
-            there, here = getattr(physics, name)[i], getattr(data, name)
+            there, here = getattr(batch, name)[i], getattr(data, name)
             there[:] = torch.as_tensor(here)
             here[:] = there.double().numpy()
-        physics.time[i] = data.time
-        warm = as_torch(physics._data.qacc_warmstart)
+        batch.time[i] = data.time
+        warm = as_torch(batch._data.qacc_warmstart)
         warm[i] = torch.as_tensor(data.qacc_warmstart)
-        task._commands[i] = torch.as_tensor(env._senses.commands)
+        batch._commands[i] = torch.as_tensor(env._senses.commands)
         if isinstance(env, FingerReachEnv):
-            task._target[i] = torch.as_tensor(env._target)
-            task._near[i] = env._steps_near
+            batch._target[i] = torch.as_tensor(env._target)
+            batch._near[i] = env._steps_near
         else:
-            task._times[i], task._steps[i] = env._t, env._steps
-            task._squares[i] = env._squares
+            batch._times[i], batch._steps[i] = env._t, env._steps
+            batch._squares[i] = env._squares
         if env.plant.held is not None:
-            task._shares[i] = torch.as_tensor(env.plant.held._now)
+            batch._shares[i] = torch.as_tensor(env.plant.held._now)
 
 
 def require_equal(results: Any, alone: list[Any], actions: Any) -> Any:
@@ -193,7 +192,7 @@ def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
         for name, value in info.items():
             assert apart(infos[name][i], value) < REWARD_TOLERANCE, name
     if kind == "circles":  # Starts are spread over closed paths.
-        times = worlds.batches[0].task._times  # pyright: ignore[reportAttributeAccessIssue]
+        times = worlds.batches[0]._times  # pyright: ignore[reportAttributeAccessIssue]
         assert 0.0 <= times.min() < times.max() < alone[0].path.duration_s
     for _ in range(30 if kind == "circles" else 8):
         actions = rng.uniform(-1.0, 1.0, (len(alone), 7)).astype(np.float32)

@@ -21,9 +21,9 @@ from typing_extensions import override
 
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
 from shapechanger.envs.warp.kernels import uniforms
-from shapechanger.envs.warp.reader import BodyReader, register_reader
-from shapechanger.envs.warp.tasks import DeviceTask, length
-from shapechanger.envs.warp.worlds import DeviceOutcome, Worlds
+from shapechanger.envs.warp.reader import BodyReader, MakeWorlds, register_reader
+from shapechanger.envs.warp.tasks import length
+from shapechanger.envs.warp.worlds import Infos, Worlds
 from shapechanger.errors import VectorEnvError
 from shapechanger.finger.anatomy import DIP_BAND, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.env import SMOOTHNESS, FingerLike, as_finger
@@ -42,34 +42,30 @@ _TARGETS: Final = 1
 _SENSES: Final = 2
 
 
-class DeviceFinger(DeviceTask):
-    """Fingers with any parameters, whose fingertip has a target."""
+class DeviceFinger(Worlds):
+    """Fingers with any parameters, whose fingertip has a target; `plant` is the first finger's."""
 
     precision = torch.float64
 
-    def __init__(self, env: Any, plant: FingerPlant, frame_skip: int) -> None:
-        super().__init__(env, plant.model, frame_skip)
-        parameters = plant.parameters
-        self._gives = parameters.gives
+    def __init__(self, env: Any, plant: FingerPlant, *args: Any, **kwargs: Any) -> None:
+        model, parameters = plant.model, plant.parameters
+        self._gives, self._held = parameters.gives, plant.held
         self._noisy = parameters.joint_noise > 0.0, parameters.tension_noise > 0.0
-        self._held = plant.held
+        super().__init__(env, model, *args, **kwargs)
         # Where the former controls of each actuator are: after two settings and their times.
-        samples = int(plant.model.actuator_history[0, 0])
-        first = np.asarray(plant.model.actuator_historyadr) + 2 + samples
-        self._former_places = first[:, None] + np.arange(samples)
-
-    @override
-    def attach(self, worlds: Worlds) -> None:
-        count, device = worlds.count, worlds.device
-        zeros = partial(torch.zeros, dtype=self.precision, device=device)
-        whole = partial(torch.zeros, count, dtype=torch.int64, device=device)
-        self._former = torch.as_tensor(self._former_places, dtype=torch.int64, device=device)
-        drive = self._env.drive
+        samples = int(model.actuator_history[0, 0])
+        first = np.asarray(model.actuator_historyadr) + 2 + samples
+        self._former = torch.as_tensor(
+            first[:, None] + np.arange(samples), dtype=torch.int64, device=self.device
+        )
         arrays: dict[str, Any] = {
-            name: torch.as_tensor(getattr(drive, name)).to(device)
+            name: torch.as_tensor(getattr(env.drive, name)).to(self.device)
             for name in ("offset", "gain", "rest")
         }
-        self._drive: Any = dataclasses.replace(drive, **arrays)
+        self._drive: Any = dataclasses.replace(env.drive, **arrays)
+        zeros = partial(torch.zeros, dtype=self.precision, device=self.device)
+        whole = partial(torch.zeros, self.count, dtype=torch.int64, device=self.device)
+        count = self.count
         self._commands, self._change = zeros(count, _T), zeros(count, _T)
         self._shares = zeros(count, _T)  # Tensions on the path, of their ranges.
         self._angles, self._velocities = zeros(count, _J), zeros(count, _J)
@@ -79,33 +75,33 @@ class DeviceFinger(DeviceTask):
         self._seeds, self._episodes, self._steps = whole(), whole(), whole()
 
     @override
-    def start(self, worlds: Worlds, mask: Tensor, seeds: Tensor, episodes: Tensor) -> None:
-        constants = worlds.constants
+    def begin(self, mask: Tensor, seeds: Tensor, episodes: Tensor) -> None:
+        constants = self.constants
         _put(self._seeds, mask, seeds)
         _put(self._episodes, mask, episodes)
         self._steps.masked_fill_(mask, 0)
-        angles = self._begin(mask)
+        angles = self._draw(mask)
         lengths = -_turned(constants["arms"], angles)
         qpos = torch.cat([angles, constants["taut"] - lengths], dim=1) if self._gives else angles
         command = self._drive.command(constants["least"], lengths, torch.zeros_like(lengths))
         command = command.clip(-1.0, 1.0)
         self._shares.masked_fill_(mask[:, None], 0.0)
         controls = command if self._held is None else self._controls(constants)
-        held = controls.to(worlds.ctrl.dtype)
-        _put(worlds.qpos, mask, qpos)
-        _put(worlds.ctrl, mask, held)
-        _put(worlds.act, mask, held)
+        held = controls.to(self.ctrl.dtype)
+        _put(self.qpos, mask, qpos)
+        _put(self.ctrl, mask, held)
+        _put(self.act, mask, held)
         if constants["history"].numel():
             history = constants["history"].to(held.dtype, copy=True)
             history[:, self._former] = held[:, :, None]
-            _put(worlds.history, mask, history)
+            _put(self.history, mask, history)
         _put(self._commands, mask, command)
         self._change.masked_fill_(mask[:, None], 0.0)
-        worlds.forward()
-        self._measure(worlds, mask)
+        self.forward()
+        self._measure(mask)
 
     @abstractmethod
-    def _begin(self, mask: Tensor) -> Tensor:
+    def _draw(self, mask: Tensor) -> Tensor:
         """Set new targets of some worlds, and return start angles of all, rad, shape (n, 4)."""
 
     @abstractmethod
@@ -118,26 +114,26 @@ class DeviceFinger(DeviceTask):
         """Whether each finger does its task, shape (n,)."""
 
     @override
-    def act(self, worlds: Worlds, actions: Tensor) -> None:
-        constants = worlds.constants
+    def apply(self, actions: Tensor) -> None:
+        constants = self.constants
         before = self._commands
         self._commands = actions.to(self.precision).clip(-1.0, 1.0)
         self._change = self._commands - before
         if self._held is None:
-            worlds.ctrl[:] = self._commands
-            worlds.simulate()
+            self.ctrl[:] = self._commands
+            self.simulate()
         else:
             for _ in range(self._held.computations):
-                lengths, speeds = self._lengths(worlds)
+                lengths, speeds = self._lengths()
                 tensions = self._drive.tension(self._commands, lengths, speeds)
                 aim = shares(tensions, constants["least"], constants["most"])
                 for _ in range(self._held.ticks):
                     slew = constants["rise"], constants["fall"]
                     self._shares = slewed(self._shares, aim, *slew)
-                    worlds.ctrl[:] = self._controls(constants)
-                    worlds.simulate()
+                    self.ctrl[:] = self._controls(constants)
+                    self.simulate()
         self._steps += 1
-        self._measure(worlds, None)
+        self._measure(None)
         self._follow()
 
     def _controls(self, constants: dict[str, Tensor]) -> Tensor:
@@ -147,29 +143,29 @@ class DeviceFinger(DeviceTask):
         rounded = shares(torch.floor(tensions / step) * step, least, most)
         return 2.0 * torch.where(step > 0.0, rounded, self._shares) - 1.0
 
-    def _lengths(self, worlds: Worlds) -> tuple[Tensor, Tensor]:
+    def _lengths(self) -> tuple[Tensor, Tensor]:
         """Return lengths at the motors, m, and their rates, m/s, shape (n, 7) each."""
-        qpos, qvel = worlds.qpos.to(self.precision), worlds.qvel.to(self.precision)
+        qpos, qvel = self.qpos.to(self.precision), self.qvel.to(self.precision)
         if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
             return -qpos[:, _J:], -qvel[:, _J:]
-        arms = worlds.constants["arms"]
+        arms = self.constants["arms"]
         return -_turned(arms, qpos), -_turned(arms, qvel)
 
-    def _measure(self, worlds: Worlds, mask: Tensor | None) -> None:
+    def _measure(self, mask: Tensor | None) -> None:
         """Measure after a step, or where a mask is given after a start in some worlds."""
-        angles = true = worlds.qpos[:, :_J].to(self.precision)
-        tensions = worlds.actuator_force.abs().to(self.precision)
+        angles = true = self.qpos[:, :_J].to(self.precision)
+        tensions = self.actuator_force.abs().to(self.precision)
         if any(self._noisy):
-            constants, stream = worlds.constants, _SENSES + self._steps
+            constants, stream = self.constants, _SENSES + self._steps
             noise = uniforms(self._seeds, self._episodes, stream, _J + _T, normal=True)
             angles = angles + constants["joint_noise"] * noise[:, :_J]
             tensions = (tensions + constants["tension_noise"] * noise[:, _J:]).clip(0.0)
-        velocities = worlds.qvel[:, :_J].to(self.precision)
+        velocities = self.qvel[:, :_J].to(self.precision)
         if mask is not None:
             velocities = torch.zeros_like(velocities)
         elif self._noisy[0]:
             velocities = smoothed(self._velocities, self._angles, angles)
-        lengths, _ = self._lengths(worlds)
+        lengths, _ = self._lengths()
         senses = torch.cat([angles, velocities, tensions, lengths, self._commands], dim=1)
 
         def kept(former: Tensor, new: Tensor) -> Tensor:
@@ -182,52 +178,51 @@ class DeviceFinger(DeviceTask):
         self._tip = kept(self._tip, _fingertip(true))
 
     @override
-    def observations(self, worlds: Worlds) -> Tensor:
+    def observations(self) -> Tensor:
         tip = self._seen_tip
         # Points of which the first is the target: (n, k, 3).
         points = self._target[:, None] if self._ahead is None else self._ahead
         offsets = (points - tip[:, None]).flatten(1)
-        return torch.cat([self._senses, tip, points[:, 0], offsets], dim=1).to(worlds.qpos.dtype)
+        return torch.cat([self._senses, tip, points[:, 0], offsets], dim=1).to(self.qpos.dtype)
 
     @override
-    def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
-        pulled = worlds.actuator_force / worlds.constants["most"]
+    def outcome(self, before: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Infos]:
+        pulled = self.actuator_force / self.constants["most"]
         terms: dict[str, Tensor] = self._env._reward.terms(
             length(self._tip - self._target),
             pulled.square().mean(dim=1),
             self._change.square().mean(dim=1),
             CONTROL_DT,
         )
-        dtype = worlds.qpos.dtype
+        dtype = self.qpos.dtype
         rewards = cast("Tensor", sum(terms.values())).to(dtype)
         terms[SMOOTHNESS.key] = 1.0 - 0.5 * self._change.abs().mean(dim=1)
-        infos = self.start_infos(worlds)
+        infos = self.start_infos()
         infos |= {name: term.to(dtype) for name, term in terms.items()}
         never = torch.zeros_like(self._steps, dtype=torch.bool)
-        return DeviceOutcome(rewards, never, infos)
+        return rewards, never, infos
 
     @override
-    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
+    def start_infos(self) -> Infos:
         return {
             "is_success": self._succeeds,
-            "distance": length(self._tip - self._target).to(worlds.qpos.dtype),
-            "target": self._target.to(worlds.qpos.dtype),
+            "distance": length(self._tip - self._target).to(self.qpos.dtype),
+            "target": self._target.to(self.qpos.dtype),
         }
 
 
 class DeviceReach(DeviceFinger):
     """Fingers that reach for a point."""
 
-    @override
-    def attach(self, worlds: Worlds) -> None:
-        super().attach(worlds)
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
         self._near = torch.zeros_like(self._steps)
         self._low, self._high, self._rest = (
-            torch.as_tensor(angles, dtype=self.precision, device=worlds.device)
+            torch.as_tensor(angles, dtype=self.precision, device=self.device)
             for angles in (*inner_range(), JOINT_REST)
         )
 
-    def _begin(self, mask: Tensor) -> Tensor:
+    def _draw(self, mask: Tensor) -> Tensor:
         low, high, rest = self._low, self._high, self._rest
         drawn = uniforms(self._seeds, self._episodes, _TARGETS, _J)
         free = low[:3] + (high - low)[:3] * drawn[:, :3]
@@ -255,14 +250,13 @@ class DeviceTrack(DeviceFinger):
     and copies points to it.
     """
 
-    @override
-    def attach(self, worlds: Worlds) -> None:
-        super().attach(worlds)
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
         self._path, self._angles_there = self._env.path, self._env.start_angles
-        self._times = np.zeros(worlds.count)
+        self._times = np.zeros(self.count)
         self._squares = torch.zeros_like(self._target[:, 0])
 
-    def _begin(self, mask: Tensor) -> Tensor:
+    def _draw(self, mask: Tensor) -> Tensor:
         chosen = mask.cpu().numpy()
         if not chosen.any():
             return self._angles
@@ -301,9 +295,9 @@ class DeviceTrack(DeviceFinger):
         return self._rms < FOLLOWS_M
 
     @override
-    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
-        rms = self._rms.to(worlds.qpos.dtype)
-        return {**super().start_infos(worlds), "rms": rms}
+    def start_infos(self) -> Infos:
+        rms = self._rms.to(self.qpos.dtype)
+        return {**super().start_infos(), "rms": rms}
 
 
 FINGERS: Final = {FingerReachEnv: DeviceReach, FingerTrackEnv: DeviceTrack}
@@ -362,8 +356,8 @@ class FingerReader(BodyReader):
         return self._env.parameters if value is None else as_finger(value)
 
     @override
-    def read(self, body: FingerParameters) -> tuple[DeviceBody, DeviceTask]:
-        """Return a compiled finger, and the task of a batch that begins with it.
+    def read(self, body: FingerParameters) -> tuple[DeviceBody, MakeWorlds]:
+        """Return a compiled finger, and the maker of a batch that begins with it.
 
         Raises:
             VectorEnvError: If its delay is a whole number of simulation steps.
@@ -385,7 +379,8 @@ class FingerReader(BodyReader):
         }
         encoded = {name: str(value).encode() for name, value in shared.items()}
         found = found._replace(rows=rows, shared={**found.shared, **encoded})
-        return found, self._task(env, plant, rhythm[0])
+        layouts = env.observation_layout, env.action_layout
+        return found, partial(self._task, env, plant, rhythm[0], layouts)
 
     @override
     def close(self) -> None:

@@ -80,7 +80,10 @@ def set_all(worlds: WarpVectorEnv, alone: Sequence[Any], states: Any) -> None:
     qpos = torch.tensor(np.array([q for q, _ in states]), dtype=torch.float32)
     qvel = torch.tensor(np.array([v for _, v in states]), dtype=torch.float32)
     worlds.reset()
-    worlds.batches[0].set_state(qpos.to(DEVICE), qvel.to(DEVICE))
+    batch, everywhere = worlds.batches[0], torch.ones(len(alone), dtype=torch.bool, device=DEVICE)
+    batch._clear(everywhere)
+    batch.qpos[:], batch.qvel[:] = qpos, qvel
+    batch._started(everywhere)
     for env, q, v in zip(alone, qpos.double().numpy(), qvel.double().numpy(), strict=True):
         mujoco.mj_resetData(env.model, env.data)
         env.set_state(q, v)

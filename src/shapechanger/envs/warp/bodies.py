@@ -3,40 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
-from functools import cache
+from collections.abc import Mapping
 from typing import Any, Final, NamedTuple, cast
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.warp.devices import mjw, wp
+from shapechanger.envs.warp.devices import mjw, on, wp
 
 Rows = Mapping[str, NDArray[Any]]
 """Arrays of one body, keyed by name."""
 
-# Only used for rendering, which does not happen on the device.
-_DRAWN: Final = ("cam_", "light_", "mat_", "geom_rgba", "geom_matid", "geom_group", "site_type")
-# Options that may differ between worlds.
-_OPTIONS: Final = ("timestep", "gravity", "wind", "magnetic", "density", "viscosity")
-# Options that are the same for all worlds.
-_SHARED_OPTIONS: Final = (
-    *("tolerance", "ls_tolerance", "noslip_tolerance", "ccd_tolerance", "impratio"),
-    *("integrator", "cone", "jacobian", "solver", "iterations", "ls_iterations"),
-    *("noslip_iterations", "ccd_iterations", "disableflags", "enableflags"),
-)
 ARMS: Final = "wrap_prm"
 """Moment arms of tendons over joints, which may differ between worlds; see `kernels`."""
-# Arrays of which mujoco-warp checks whether all numbers are zero, or which.
-_ANY_ZERO: Final = (
-    *("tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly"),
-    *("actuator_damping", "actuator_dampingpoly", "dof_frictionloss"),
-    *("tendon_frictionloss", "geom_adhesion", "geom_surfacevel"),
+# Only used for rendering, sleeping bodies and sensors, which the tasks do not have.
+_UNREAD: Final = (
+    *("cam_", "light_", "mat_", "geom_rgba", "geom_matid", "geom_group", "site_type"),
+    *("dof_length", "site_size"),
 )
-_EACH_ZERO: Final = ("actuator_gainprm", "actuator_biasprm", "actuator_gear", "body_mass")
-# Used only by sleeping bodies and sensors, which the tasks do not have.
-_UNREAD: Final = ("dof_length", "site_size")
 
 
 class DeviceBody(NamedTuple):
@@ -44,8 +29,8 @@ class DeviceBody(NamedTuple):
 
     Attributes:
         name: Its name or edits, for messages.
-        shared: Arrays that all worlds of a batch have in common, as bytes.
-        rows: Arrays that may differ between worlds.
+        shared: Numbers and arrays that all worlds of a batch have in common, as bytes.
+        rows: Arrays that may differ between worlds; those of the options begin with `opt.`.
         static: Places and orientations of the geoms that never move, which the device's kinematics
             leaves as they are: `geom_xpos` (k, 3) and `geom_xmat` (k, 3, 3).
         constants: Numbers of the task that depend on the body.
@@ -59,24 +44,41 @@ class DeviceBody(NamedTuple):
 
 
 def device_body(name: str, model: mujoco.MjModel, constants: Rows) -> DeviceBody:
-    """Read a compiled body.
+    """Read a compiled body, as mujoco-warp reads it.
 
     Args:
         name: Its name or edits, for messages.
         model: The compiled model.
         constants: Numbers of the task that depend on the body.
     """
-    names = [field.name for field in _fields() if _has_rows(field)]
-    rows = {name: np.array(getattr(model, name)) for name in (*names, ARMS)}
-    rows |= {f"opt.{name}": np.array(getattr(model.opt, name)) for name in _OPTIONS}
+    with on("cpu"):
+        made = mjw.put_model(model)
+    rows: dict[str, NDArray[Any]] = {}
+    shared: dict[str, bytes] = {}
+    for prefix, owner in (("", made), ("opt.", made.opt)):
+        for field in dataclasses.fields(owner):
+            key, kind = prefix + field.name, cast("Any", field.type)
+            if field.name.startswith(_UNREAD):
+                continue
+            if kind is int or kind is bool:
+                shared[key] = str(int(getattr(owner, field.name))).encode()
+            elif isinstance(kind, wp.array):
+                array = getattr(owner, field.name).numpy()
+                is_row = kind.shape[0] == "*"
+                if key == ARMS:  # A pulley's divisor takes the place of the arms.
+                    is_row = bool((model.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT).all())
+                if is_row:
+                    rows[key] = array
+                shared[key] = str(array.shape).encode() + (b"" if is_row else array.tobytes())
+    # The memory for constraints depends on which of these are zero, in a batch's first body.
+    for key in ("dof_frictionloss", "tendon_frictionloss"):
+        shared[f"zeros of {key}"] = (getattr(model, key) > 0.0).tobytes()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    static = static_geoms(model)
-    places = {
-        "geom_xpos": data.geom_xpos[static],
-        "geom_xmat": data.geom_xmat[static].reshape(-1, 3, 3),
-    }
-    return DeviceBody(name, dict(_shared(model)), rows, places, constants)
+    fixed = static_geoms(model)
+    places = {"geom_xpos": data.geom_xpos[fixed]}
+    places["geom_xmat"] = data.geom_xmat[fixed].reshape(-1, 3, 3)
+    return DeviceBody(name, shared, rows, places, constants)
 
 
 def static_geoms(model: mujoco.MjModel) -> NDArray[np.intp]:
@@ -93,42 +95,3 @@ def differing_arrays(one: DeviceBody, other: DeviceBody) -> list[str]:
     """Return the names of the arrays because of which two bodies cannot share a batch."""
     names = {**one.shared, **other.shared}
     return [name for name in names if one.shared.get(name) != other.shared.get(name)]
-
-
-@cache
-def _fields() -> list[Any]:
-    """Return the fields of mujoco-warp's model that are not for rendering."""
-    return [f for f in dataclasses.fields(mjw.Model) if not f.name.startswith(_DRAWN)]
-
-
-def _has_rows(field: Any) -> bool:
-    """Return whether a field is an array that may differ between worlds."""
-    return isinstance(field.type, wp.array) and field.type.shape[0] == "*"
-
-
-def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
-    """Yield name and bytes of all data that mujoco-warp keeps once for all worlds."""
-    for field in _fields():
-        name = field.name
-        if name in _UNREAD or not hasattr(model, name):
-            continue
-        value: Any = getattr(model, name)
-        if field.type is int or field.type is bool:
-            yield name, str(int(value)).encode()
-        elif isinstance(field.type, wp.array):
-            array: NDArray[Any] = np.asarray(value)
-            # Rows only share their shape. A pulley's divisor takes the place of the arms.
-            only_joints = bool(np.all(model.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT))
-            own = _has_rows(field) or (name == ARMS and only_joints)
-            yield name, str(array.shape).encode() + (b"" if own else array.tobytes())
-    for name in _SHARED_OPTIONS:
-        yield f"opt.{name}", str(getattr(model.opt, name)).encode()
-    # If arrays are zero, mujoco-warp skips the related computations. It decides this once for all
-    # worlds, from the model that a batch is created from (`put_model`).
-    for name in _ANY_ZERO:
-        yield f"zeros of {name}", str(np.any(getattr(model, name))).encode()
-    for name in _EACH_ZERO:
-        yield f"zeros of {name}", (np.asarray(getattr(model, name)) != 0.0).tobytes()
-    options = cast("Any", model.opt)
-    in_fluid = options.wind.any() or options.density > 0.0 or options.viscosity > 0.0
-    yield "zeros of opt.wind, opt.density and opt.viscosity", str(bool(in_fluid)).encode()

@@ -98,8 +98,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._task_infos = task_infos
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
         self.batches = tuple(
-            Worlds(*group, device, redraws=redraws, limits=limits or {})
-            for group in grouped(reader, [reader.body(body) for body in bodies], num_envs)
+            make(device, redraws=redraws, limits=limits or {})
+            for make in grouped(reader, [reader.body(body) for body in bodies], num_envs)
         )
         first = self.batches[0]
         self.observation_layout: Layout = first.observation_layout
@@ -250,11 +250,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             raise gym.error.ResetNeeded("No episode is under way: call `reset` first.")
         each = dict(zip(self.batches, self._checked(actions), strict=True))
         steps = self._each(lambda batch: batch.step(each[batch]))
-        observations = [seen for seen, _, _ in steps]
-        outcomes = [
-            {"rewards": outcome.rewards, "terminated": outcome.terminated, "diverged": bad}
-            for _, outcome, bad in steps
-        ]
+        observations, outcomes, told = map(list, zip(*steps, strict=True))
         rewards, terminated, diverged = self._gathered(outcomes).values()
         self.episode_steps += 1
         limit = self.max_episode_steps
@@ -267,10 +263,10 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             **{"diverged": diverged, "_diverged": diverged},
         }
         if self._task_infos:
-            told = self._gathered([outcome.infos for _, outcome, _ in steps])
-            final_info = _merged(({**told, "diverged": diverged}, ended))
+            during = self._gathered(told)
+            final_info = _merged(({**during, "diverged": diverged}, ended))
             infos |= {"final_info": final_info, "_final_info": ended}
-            infos |= _merged((told, ~ended), (start_infos, ended))
+            infos |= _merged((during, ~ended), (start_infos, ended))
         self._steps += 1
         if self._steps % _LOOKS_EVERY == 0:
             self._warn_of_overflows()

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
 from typing import Any, Final
 
 import gymnasium as gym
+import mujoco
 
 from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS
 from shapechanger.envs.checks import describe_body
 from shapechanger.envs.warp.bodies import DeviceBody, device_body, differing_arrays
+from shapechanger.envs.warp.kernels import follow_mujoco
 from shapechanger.envs.warp.tasks import TASKS, DeviceTask
+from shapechanger.envs.warp.worlds import Worlds
 from shapechanger.errors import SpaceMismatch, VectorEnvError
 from shapechanger.morphology import Body
 
 _Make = Callable[[dict[str, Any]], gym.Env[Any, Any]]
+MakeWorlds = Callable[..., Worlds]
+"""Makes `Worlds` from their numbers and the arguments after these."""
 
 
 class BodyReader:
@@ -49,15 +55,21 @@ class BodyReader:
         """Return a body as a hashable value; None gives the body in the arguments."""
         return self._usual if value is None else self._envs[0].family.body(value)
 
-    def read(self, body: Any) -> tuple[DeviceBody, DeviceTask]:
-        """Compile a body, and return it with the task of a batch that begins with it.
+    def read(self, body: Any) -> tuple[DeviceBody, MakeWorlds]:
+        """Compile a body, and return it with the maker of a batch that begins with it.
 
         Raises:
             ShapechangerError: If it cannot be built, or not for a device.
         """
         env = self._env_with(body)
-        found = device_body(describe_body(env), env.model, self._task.constants(env))
-        return found, self._task(env, env.model, int(env.frame_skip))
+        model = env.model
+        if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
+            # mujoco-warp has no PGS. Newton's method solves the same problem, to its end.
+            model = copy.copy(model)
+            model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        layouts = env.observation_layout, env.action_layout
+        found = device_body(describe_body(env), model, self._task.constants_of(env))
+        return found, partial(self._task, env, model, int(env.frame_skip), layouts)
 
     def _env_with(self, body: Body) -> Any:
         for env in self._envs:
@@ -97,10 +109,11 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
         arguments: Arguments of the CPU env.
 
     Raises:
-        VectorEnvError: If the task has no batched functions.
+        VectorEnvError: If the task has no batched functions, or mujoco-warp has another version.
     """
+    follow_mujoco()
     first = make(arguments)
-    for module in {task.device for task in FINGER_ENVS.values()} - {""}:
+    for module in {task.device for task in FINGER_ENVS.values()}:
         import_module(module)
     reader = _READERS.get(type(first.unwrapped))
     if reader is not None:
@@ -117,31 +130,29 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
     )
 
 
-def grouped(
-    reader: BodyReader, bodies: Sequence[Any], num_envs: int
-) -> list[tuple[DeviceTask, list[int], dict[Any, DeviceBody], list[Any]]]:
+def grouped(reader: BodyReader, bodies: Sequence[Any], num_envs: int) -> list[MakeWorlds]:
     """Compile bodies, assign them to worlds in turn, and group worlds by the shapes of arrays.
 
     Returns:
-        The first arguments of each group's `Worlds`.
+        The makers of each group's `Worlds`, from the device and what follows it.
 
     Raises:
         VectorEnvError: If there are fewer worlds than shapes.
     """
-    kinds: list[tuple[DeviceTask, dict[Any, DeviceBody]]] = []
+    kinds: list[tuple[MakeWorlds, dict[Any, DeviceBody]]] = []
     for body in dict.fromkeys(bodies):
-        read, task = reader.read(body)
+        read, make = reader.read(body)
         for _, known in kinds:
             if not differing_arrays(next(iter(known.values())), read):
                 known[body] = read
                 break
         else:
-            kinds.append((task, {body: read}))
+            kinds.append((make, {body: read}))
     # A pool of more bodies than worlds is spread over them.
     step = max(1, len(bodies) // num_envs)
     each = [bodies[world * step % len(bodies)] for world in range(num_envs)]
-    groups: list[tuple[DeviceTask, list[int], dict[Any, DeviceBody], list[Any]]] = []
-    for task, known in kinds:
+    groups: list[MakeWorlds] = []
+    for make, known in kinds:
         worlds = [world for world, body in enumerate(each) if body in known]
         if not worlds:
             raise VectorEnvError(
@@ -149,5 +160,5 @@ def grouped(
                 f"pool form {len(kinds)} batches, because their arrays differ, and there are "
                 f"{num_envs} worlds, so make more."
             )
-        groups.append((task, worlds, known, [each[world] for world in worlds]))
+        groups.append(partial(make, worlds, known, [each[world] for world in worlds]))
     return groups

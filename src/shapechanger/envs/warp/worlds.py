@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import copy
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import gymnasium as gym
 import mujoco
@@ -20,9 +20,13 @@ from shapechanger.envs.warp.bodies import (
     geom_type,
     static_geoms,
 )
-from shapechanger.envs.warp.devices import as_torch, mjw, on, without_gradients, wp
-from shapechanger.envs.warp.kernels import follow_mujoco, uniforms
+from shapechanger.envs.warp.devices import as_torch, mjw, on, wp
+from shapechanger.envs.warp.kernels import uniforms
 from shapechanger.errors import VectorEnvError
+from shapechanger.layout import Layout
+
+Infos = dict[str, Tensor]
+"""Tensors with a row per world, keyed by name."""
 
 _MOST_LISTED: Final = 4
 # Stream of the random numbers that choose bodies; tasks use those from 0 on.
@@ -43,22 +47,10 @@ _MOST_CONTACTS: Final = {"SPHERE": 1, "CAPSULE": 2, "": 8}
 _ROWS_PER_EQUALITY: Final = 6
 
 
-class DeviceOutcome(NamedTuple):
-    """Rewards, ends and infos of a step.
-
-    Attributes:
-        rewards: Shape (n,).
-        terminated: Shape (n,).
-        infos: Tensors of shape (n, ...).
-    """
-
-    rewards: Tensor
-    terminated: Tensor
-    infos: dict[str, Tensor]
-
-
-class Worlds:
+class Worlds(ABC):
     """Worlds whose bodies have arrays of the same shapes, which are stepped together.
+
+    A subclass is a task: start, action, observation, reward and end as functions of tensors.
 
     Arrays of MuJoCo's data are attributes with its names and units, as views with a row per world:
     `qpos` (n, nq), `qvel`, `qacc`, `qfrc_actuator` and `qfrc_constraint` (n, nv), `ctrl` and
@@ -68,7 +60,10 @@ class Worlds:
     (n, ngeom, 3) and `geom_xmat` (n, ngeom, 3, 3).
 
     Args:
-        task: Their `DeviceTask`.
+        env: A CPU env of the task, which reads the bodies.
+        model: The compiled model of the first body.
+        frame_skip: Physics steps of each `simulate`.
+        layouts: Layouts of observations and actions with the first body.
         numbers: The number of each world in the vector env.
         bodies: The bodies that the worlds can have, keyed by their edits.
         each: The edits of each world's body.
@@ -87,11 +82,21 @@ class Worlds:
         action_layout: Name, unit and range of each number of an action.
         single_observation_space: Space of one world's observations, float32.
         single_action_space: Space of one world's actions.
+        precision: Type of the constants.
+        contact_forces: Whether the task reads `cfrc_ext`.
+        start_forces: Whether the first observation reads forces.
     """
+
+    precision: ClassVar[torch.dtype] = torch.float32
+    contact_forces: ClassVar[bool] = False
+    start_forces: ClassVar[bool] = False
 
     def __init__(
         self,
-        task: Any,
+        env: Any,
+        model: mujoco.MjModel,
+        frame_skip: int,
+        layouts: tuple[Layout, Layout],
         numbers: Sequence[int],
         bodies: Mapping[Any, DeviceBody],
         each: Sequence[Any],
@@ -100,24 +105,17 @@ class Worlds:
         redraws: bool,
         limits: Mapping[str, int],
     ) -> None:
-        self.task = task
+        self._env, self.model, self._frame_skip = env, model, frame_skip
         self.numbers = torch.tensor(numbers, device=device)
         self.count, self.device = len(numbers), device
-        self.observation_layout, self.action_layout = task.observation_layout, task.action_layout
-        size = (task.observation_layout.size,)
+        self.observation_layout, self.action_layout = layouts
+        size = (self.observation_layout.size,)
         self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, size, np.float32)
-        self.single_action_space = task.action_space
+        self.single_action_space: gym.spaces.Box = env.action_space
         self._redraws = redraws
         # The graph of each function, and the functions whose kernels are loaded.
         self._graphs: dict[str, Any] = {}
         self._warm: set[str] = set()
-        model = task.model
-        self._static = torch.as_tensor(static_geoms(model), device=device)
-        follow_mujoco()
-        if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
-            # mujoco-warp has no PGS. Newton's method solves the same problem, to its end.
-            model = copy.copy(model)
-            model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         with on(device):
             self._model = mjw.put_model(model)
             self._model.opt.warn_overflow = 0  # `overflows` reports them without printing.
@@ -128,33 +126,60 @@ class Worlds:
         self._overflow = as_torch(self._data.overflow)
         cleared = [getattr(self._data, name) for name in _CLEARED]
         self._cleared = [as_torch(array) for array in cleared if array.size]
-        # Fields of the model with a row per world, and the rows of each body for these, for the
-        # constants, and for the places of static geoms.
+        # Fields of the model with a row per world.
         self._rows: dict[str, Tensor] = {}
         self.constants: dict[str, Tensor] = {}
-        self._tables: dict[str, Tensor] = {}
-        self._constant_tables: dict[str, Tensor] = {}
-        self._static_tables: dict[str, Tensor] = {}
+        # What depends on a world's body: a tensor, the part of it, and the rows of all bodies.
+        self._tables: dict[str, tuple[Tensor, Any, Tensor]] = {}
         self.change_bodies(bodies, each)
-        task.attach(self)
-        self._before = task.place(self).clone()
+        self._before = self.place().clone()
 
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Tensor: ...
 
+    @abstractmethod
+    def begin(self, mask: Tensor, seeds: Tensor, episodes: Tensor) -> None:
+        """Put worlds, whose state has been cleared, into start states; arguments as of `start`."""
+
+    def apply(self, actions: Tensor) -> None:
+        """Apply actions, shape (n, nu), and step the physics."""
+        self.ctrl[:] = actions
+        self.simulate()
+
+    def place(self) -> Tensor:
+        """Return the part of the state before the physics that the reward needs (a view)."""
+        return self.qpos[:, :0]
+
+    @abstractmethod
+    def observations(self) -> Tensor:
+        """Return the observations, shape (n, size)."""
+
+    @abstractmethod
+    def outcome(self, before: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Infos]:
+        """Return rewards, shape (n,), terminations, (n,), and infos of a step.
+
+        Args:
+            before: Result of `place` before the physics.
+            actions: Shape (n, nu).
+        """
+
+    def start_infos(self) -> Infos:
+        """Return the infos of a reset."""
+        return {}
+
     def row(self, name: str) -> Tensor:
         """Return a field of the model for all worlds, such as `geom_size`, (n or 1, ...)."""
-        return self._rows.get(name, self._by_world(name, self._array(name)))
-
-    def _by_world(self, name: str, array: Any) -> Tensor:
-        """Return an array that is not yet wide, with a leading dimension."""
-        view = as_torch(array)
+        if name in self._rows:
+            return self._rows[name]
+        owner, field = self._field(name)
+        view = as_torch(getattr(owner, field))
         return view[None] if name == ARMS else view
 
-    def _array(self, name: str) -> Any:
-        owner, _, field = name.rpartition(".")
-        return getattr(self._model.opt if owner else self._model, field)
+    def _field(self, name: str) -> tuple[Any, str]:
+        """Return where a field of the model is, and its name there."""
+        part, _, field = name.rpartition(".")
+        return (self._model.opt if part else self._model), field
 
     def require_fitting(self, body: DeviceBody) -> None:
         """Raise a VectorEnvError unless a body has the arrays of these worlds."""
@@ -179,54 +204,49 @@ class Worlds:
         self.bodies = bodies
         held = [*bodies.values()]
         for name in held[0].rows:
-            array = self._array(name)
-            if not array.size:
+            row = self.row(name)[0]
+            if not row.numel():
                 continue
-            row = self._by_world(name, array)[0]
             table = _stacked([body.rows[name] for body in held], row)
             if name not in self._rows:
                 if bool((table == row).all()):
                     continue
-                self._widen(name, array)
-            self._tables[name] = table
-        if self._static.numel():
-            for name, view in (("geom_xpos", self.geom_xpos), ("geom_xmat", self.geom_xmat)):
-                like = view[0, self._static]
-                self._static_tables[name] = _stacked([body.static[name] for body in held], like)
+                self._widen(name)
+            self._tables[name] = self._rows[name], ..., table
+        fixed = torch.as_tensor(static_geoms(self.model), device=self.device)
+        for name, view in (("geom_xpos", self.geom_xpos), ("geom_xmat", self.geom_xmat)):
+            table = _stacked([body.static[name] for body in held], view[0, fixed])
+            self._tables[name] = view, (slice(None), fixed), table
         for name in held[0].constants:
             rows = np.stack([body.constants[name] for body in held])
-            table = torch.as_tensor(rows, dtype=self.task.precision, device=self.device)
-            self._constant_tables[name] = table
+            table = torch.as_tensor(rows, dtype=self.precision, device=self.device)
             if name not in self.constants:
                 self.constants[name] = table.new_empty((self.count, *table.shape[1:]))
+            self._tables[f"constant {name}"] = self.constants[name], ..., table
         place = {body: i for i, body in enumerate(bodies)}
         self._choose(torch.tensor([place[body] for body in each], device=self.device))
 
     def _choose(self, chosen: Tensor) -> None:
         """Give each world one of the stored bodies, without synchronisation with the device."""
         self.chosen = chosen
-        for name, table in self._tables.items():
-            self._rows[name].copy_(table[chosen])
-        for name, table in self._static_tables.items():
-            getattr(self, name)[:, self._static] = table[chosen]
-        for name, table in self._constant_tables.items():
-            self.constants[name].copy_(table[chosen])
+        for target, part, table in self._tables.values():
+            target[part] = table[chosen]
 
-    def _widen(self, name: str, array: Any) -> None:
+    def _widen(self, name: str) -> None:
         """Give a field of the model one row per world."""
+        owner, field = self._field(name)
+        array, former = getattr(owner, field), self.row(name)
         shape = (self.count * array.size,) if name == ARMS else (self.count, *array.shape[1:])
         with on(self.device):
             wide = wp.empty(shape, dtype=array.dtype)
         wide._is_batched = True  # The mark of mujoco-warp for such arrays.
-        former = self._by_world(name, array)
         view = self._rows[name] = as_torch(wide).view(self.count, *former.shape[1:])
         view[:] = former
-        owner, _, field = name.rpartition(".")
-        setattr(self._model.opt if owner else self._model, field, wide)
+        setattr(owner, field, wide)
         self._graphs.clear()  # They hold the former array.
         self._warm.clear()  # Some kernels depend on which arrays are wide.
 
-    def step(self, actions: Tensor) -> tuple[Tensor, DeviceOutcome, Tensor]:
+    def step(self, actions: Tensor) -> tuple[Tensor, dict[str, Tensor], Infos]:
         """Take one step of the task in each world.
 
         A world whose simulation has diverged is terminated with the reward 0, and put back to its
@@ -236,14 +256,14 @@ class Worlds:
             actions: Shape (n, nu).
 
         Returns:
-            Observations, shape (n, size); rewards, ends and infos; and which worlds have diverged,
-            shape (n,).
+            Observations, shape (n, size); `rewards`, `terminated` and `diverged`, shape (n,) each;
+            and infos.
         """
-        task, actions = self.task, actions.detach()
-        task.act(self, actions)
-        outcome = task.outcome(self, self._before, actions)
-        observations = task.observations(self)
-        self._before = task.place(self).clone()
+        actions = actions.detach()
+        self.apply(actions)
+        rewards, terminated, infos = self.outcome(self._before, actions)
+        observations = self.observations()
+        self._before = self.place().clone()
         state = torch.cat([self.qpos, self.qvel, self.qacc], dim=1)
         # Also true for NaN.
         bounded = (state.abs() <= mujoco.mjMAXVAL).all(dim=1)
@@ -252,13 +272,10 @@ class Worlds:
         self._clear(diverged)
         poses = self.constants["init_qpos"].to(self.qpos.dtype)
         self.qpos.copy_(torch.where(diverged[:, None], poses, self.qpos))
-        rewards = outcome.rewards.masked_fill(diverged, 0.0)
-        terminated = outcome.terminated | diverged
-        return observations, outcome._replace(rewards=rewards, terminated=terminated), diverged
+        ends = {"rewards": rewards.masked_fill(diverged, 0.0), "terminated": terminated | diverged}
+        return observations, {**ends, "diverged": diverged}, infos
 
-    def start(
-        self, mask: Tensor, seeds: Tensor, episodes: Tensor
-    ) -> tuple[Tensor, dict[str, Tensor]]:
+    def start(self, mask: Tensor, seeds: Tensor, episodes: Tensor) -> tuple[Tensor, Infos]:
         """Start an episode in some worlds.
 
         Args:
@@ -273,27 +290,16 @@ class Worlds:
         if self._redraws:
             drawn = uniforms(seeds, episodes, _BODIES, 1)[:, 0] * len(self.bodies)
             self._choose(torch.where(mask, drawn.to(torch.int64), self.chosen))
-        self.task.start(self, mask, seeds, episodes)
+        self.begin(mask, seeds, episodes)
         return self._started(mask)
 
-    @without_gradients()
-    def set_state(self, qpos: Tensor, qvel: Tensor) -> None:
-        """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear the rest.
-
-        Fingers have further state: start them with `start`.
-        """
-        everywhere = torch.ones(self.count, dtype=torch.bool, device=qpos.device)
-        self._clear(everywhere)
-        self.qpos[:], self.qvel[:] = qpos, qvel
-        self._started(everywhere)
-
-    def _started(self, mask: Tensor) -> tuple[Tensor, dict[str, Tensor]]:
-        if self.task.start_forces:
+    def _started(self, mask: Tensor) -> tuple[Tensor, Infos]:
+        if self.start_forces:
             self.forward()
         else:
             self.kinematics()
-        self._before = torch.where(mask[:, None], self.task.place(self), self._before)
-        return self.task.observations(self), self.task.start_infos(self)
+        self._before = torch.where(mask[:, None], self.place(), self._before)
+        return self.observations(), self.start_infos()
 
     def _clear(self, mask: Tensor) -> None:
         """Clear velocities, controls, warm starts and forces, as MuJoCo's own reset does."""
@@ -305,9 +311,9 @@ class Worlds:
         self._run("simulate", self._simulate)
 
     def _simulate(self) -> None:
-        for _ in range(self.task.frame_skip):
+        for _ in range(self._frame_skip):
             mjw.step(self._model, self._data)
-        if self.task.contact_forces:
+        if self.contact_forces:
             mjw.rne_postconstraint(self._model, self._data)
 
     def kinematics(self) -> None:
