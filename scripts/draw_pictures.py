@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -74,39 +74,38 @@ def _bodies(
     panels: list[Panel] = []
     for names in groups:
         refs = [EnvRef(f"shapechanger/{name}-v1", arguments) for name in names.split()]
-        distance = farther * max(view_distance(ref) for ref in refs)
-        for ref in refs:
-            played = _play(ref, load_policy(reference_policy(ref.id)), seconds, distance=distance)
-            panels.append([frame[:rows] for frame in played])
+        view = {"distance": farther * max(map(view_distance, refs))}
+        played = [_film(ref, load_policy(reference_policy(ref.id)), seconds, view) for ref in refs]
+        panels += [[frame[:rows] for frame in panel] for panel in played]
     return panels
 
 
-def _play(
-    ref: EnvRef, policy: Any, seconds: float, *, seed: int = 0, distance: float | None = None
-) -> Panel:
-    """Film a policy; a body that falls stays as it is.
+def _made(ref: EnvRef, view: dict[str, Any] | None, size: tuple[int, int] = _SIZE) -> Any:
+    """Make an env that renders; `view` is a body's camera, and None for a finger."""
+    of_body = {} if view is None else {"shadows": True, "default_camera_config": view}
+    return ref.make(render_mode="rgb_array", width=size[0], height=size[1], **of_body)
 
-    `distance` is the view's for a body, and None for a finger.
-    """
-    wide, high = _SIZE
-    shadows = {} if distance is None else {"shadows": True}
-    env = cast("Any", ref.make(render_mode="rgb_array", width=wide, height=high, **shadows))
-    if distance is not None:
-        env.unwrapped.mujoco_renderer.default_cam_config["distance"] = distance
-    fps = env.metadata["render_fps"]
+
+def _film(
+    ref: EnvRef, policy: Any, seconds: float, view: dict[str, Any] | None = None, seed: int = 0
+) -> Panel:
+    """Film a policy; a body that falls stays as it is."""
+    env = _made(ref, view)
+    frames = list(_played(env, policy, round(seconds * _FPS), _FPS, seed))
+    env.close()
+    return frames
+
+
+def _played(env: Any, policy: Any, count: int, fps: int, seed: int) -> Iterator[Picture]:
+    """Yield frames of a policy; the last one again after the end of the episode."""
     observation, _ = env.reset(seed=seed)
-    frames: Panel = []
     taken, over = 0, False
-    while len(frames) < round(seconds * _FPS):
-        while not over and taken * _FPS < len(frames) * fps:
+    for number in range(count):
+        while not over and taken * fps < number * env.metadata["render_fps"]:
             action = policy.act(np.asarray(observation)[None])[0]
             observation, _, terminated, truncated, _ = env.step(action)
             taken, over = taken + 1, terminated or truncated
-        frames.append(frames[-1] if over else env.render())
-    if over:
-        print(f"{ref.id} ended after {taken / fps:.1f} s")
-    env.close()
-    return frames
+        yield env.render()
 
 
 def _finger() -> list[Panel]:
@@ -114,8 +113,8 @@ def _finger() -> list[Panel]:
     reach, track = (load_policy(POLICIES[name]) for name in ("reach", "track"))
     target = EnvRef("shapechanger/Finger-v1")
     path = EnvRef("shapechanger/FingerTrack-v1", {"path": "figure-eight"})
-    reached = [frame for seed in (1, 4) for frame in _play(target, reach, 2.0, seed=seed)]
-    return [reached, _play(path, track, 4.0, seed=1)]
+    reached = [frame for seed in (1, 4) for frame in _film(target, reach, 2.0, seed=seed)]
+    return [reached, _film(path, track, 4.0, seed=1)]
 
 
 # Direction of the view from a vehicle's heading: 0 is from behind.
@@ -180,10 +179,8 @@ def _transferred() -> dict[str, tuple[EnvRef, Any]]:
 
 def _film_transfer() -> list[Panel]:
     shown = _transferred().values()
-    distance = max(view_distance(ref) for ref, _ in shown)
-    return [
-        _play(ref, policy, 10.0, seed=EVALUATION_SEED, distance=distance) for ref, policy in shown
-    ]
+    view = {"distance": max(view_distance(ref) for ref, _ in shown)}
+    return [_film(ref, policy, 10.0, view, EVALUATION_SEED) for ref, policy in shown]
 
 
 # The view of the strip: 22 m of the floor from the side, once a second.
@@ -211,29 +208,23 @@ def _photograph_transfer(path: Path) -> None:
 def _photographed(ref: EnvRef, policy: Any) -> tuple[Picture, float]:
     """Return a multiple exposure of an ant that walks past a fixed camera, and its way, m."""
     wide, high = _STRIP
-    place = {"lookat": np.array([_STRIP_M / 2 - 2.0, 0.0, 0.4]), "distance": _AWAY_M}
-    view = {**place, "azimuth": 90.0, "elevation": -6.0}
-    size = {"render_mode": "rgb_array", "width": 2 * wide, "height": 2 * high}
-    env = cast("Any", ref.make(**size, shadows=True, default_camera_config=view))
+    view = {"lookat": np.array([_STRIP_M / 2 - 2.0, 0.0, 0.4]), "distance": _AWAY_M}
+    env = _made(ref, {**view, "azimuth": 90.0, "elevation": -6.0}, (2 * wide, 2 * high))
     data, model = env.unwrapped.data, env.unwrapped.model
     model.vis.global_.fovy = math.degrees(2.0 * math.atan(_STRIP_M * high / wide / 2.0 / _AWAY_M))
-    observation, _ = env.reset(seed=EVALUATION_SEED)
-    start = float(data.qpos[0])
-    exposures: Panel = [env.render()]
-    for _ in range(_STRIP_S):
-        for _ in range(round(env.metadata["render_fps"])):
-            observation, *_ = env.step(policy.act(np.asarray(observation)[None])[0])
-        exposures.append(env.render())
-    way = float(data.qpos[0]) - start
+    exposures: Panel = []
+    places: list[float] = []
+    for exposure in _played(env, policy, _STRIP_S + 1, 1, EVALUATION_SEED):
+        exposures.append(exposure)
+        places.append(float(data.qpos[0]))
     data.qpos[2] = -100.0  # Below the floor, where it is not in view.
     mujoco.mj_forward(model, data)
-    empty = env.render().astype(int)
+    picture = empty = env.render().astype(int)
     env.close()
-    picture = empty.copy()
     for exposure in exposures:
-        ant = np.abs(exposure.astype(int) - empty).max(axis=2) > _VISIBLE
-        picture[ant] = exposure[ant]
-    return _smooth(picture).astype(np.uint8), way
+        ant = np.abs(exposure.astype(int) - empty).max(axis=2, keepdims=True) > _VISIBLE
+        picture = np.where(ant, exposure, picture)
+    return _smooth(picture).astype(np.uint8), places[-1] - places[0]
 
 
 CLIPS: Final[Mapping[str, Callable[[], list[Panel]]]] = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import io
 import logging
 import os
 from functools import cache
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 import gymnasium as gym
+import imageio.v3 as iio
 
 import shapechanger
 from scripts.wiring_diagrams import draw_wiring, part_list, pin_table, table
@@ -25,7 +25,7 @@ from shapechanger.envs.catalogue import (
     VEHICLE_ENVS,
     summaries,
 )
-from shapechanger.errors import EmptyShift, RenderError
+from shapechanger.errors import RenderError
 from shapechanger.robot.profile import load_profile, shipped_profiles
 
 Pages = dict[str, str | bytes]
@@ -52,23 +52,20 @@ def environment_pages() -> Pages:
     """
     pages: Pages = {"environments/index.md": ""}
     rows: list[tuple[str, ...]] = []
-    for env_id in gym.registry:
-        if not env_id.startswith(f"{NAMESPACE}/") or env_id in ODRL_ENVS:
-            continue
-        short = _short(env_id)
-        content, picture = _environment(env_id)
-        pages[f"environments/{short}.md"] = content
-        shown = ""
+    ours = [env_id for env_id in gym.registry if env_id.startswith(f"{NAMESPACE}/")]
+    for env_id in (env_id for env_id in ours if env_id not in ODRL_ENVS):
+        short, shown = _short(env_id), ""
+        pages[f"environments/{short}.md"], picture = _environment(env_id)
         if picture is not None:
             pages[f"environments/{short}.jpg"] = picture
-            shown = f"![{short}]({short}.jpg){{ width=96 height=72 loading=lazy }}"
-            shown = f"[{shown}]({short}.md)"
+            image = f"![{short}]({short}.jpg){{ width=96 height=72 loading=lazy }}"
+            shown = f"[{image}]({short}.md)"
         rows.append((shown, f"[`{env_id}`]({short}.md)", _summary(env_id)))
     rows.append(("", "[ODRL](ODRL.md)", f"{len(ODRL_ENVS)} ids: published bodies of four runners"))
     pages["environments/index.md"] = _page(
         "# Environments",
         "`import shapechanger` registers these ids with Gymnasium. Their pages are made from the "
-        "registry, the docstrings, the certificates and the models of this version; "
+        "registry, the docstrings and the models of this version; "
         "`shapechanger envs show ENV` prints the name, unit and range of each number.",
         table(("picture", "id", "body"), rows),
     )
@@ -87,34 +84,35 @@ def environment_pages() -> Pages:
 
 
 def _environment(env_id: str) -> tuple[str, bytes | None]:
-    """Return the page of an env, from registry, docstring and certificate, and its image.
+    """Return the page of an env, from registry and docstring, and its image at a start, as JPEG.
 
     Raises:
         RenderError: If nothing renders on CI, where nothing may be missing.
     """
-    short, spec = _short(env_id), gym.registry[env_id]
+    short, spec, picture = _short(env_id), gym.registry[env_id], None
     module, _, name = cast("str", spec.entry_point).partition(":")
-    certificate, picture = "", None
     # The others need a robot or a file.
     if not short.startswith("Remote") and env_id != OWN_ROBOT:
-        env = EnvRef(env_id).make()
-        try:
-            # Vehicles are compared by what their cameras see, too.
-            certificate = _certificate(env_id, env)
-            if hasattr(env.unwrapped, "picture"):
-                picture = _picture(env)
-        except RenderError as error:
-            if os.environ.get("CI") == "true":
-                raise
-            _LOG.info("The page of %s has no picture: %s", env_id, error)
-        env.close()
+        with EnvRef(env_id).make() as env:
+            try:
+                if hasattr(env.unwrapped, "picture"):
+                    env.reset(seed=0)
+                    frame = cast("Any", env.unwrapped).picture(*_SIZE)
+                    picture = iio.imwrite("<bytes>", frame, extension=".jpg", quality=_QUALITY)
+            except RenderError as error:
+                if os.environ.get("CI") == "true":
+                    raise
+                _LOG.info("The page of %s has no picture: %s", env_id, error)
     steps, threshold = spec.max_episode_steps, spec.reward_threshold
     given = ", ".join(f"{name}={value!r}" for name, value in spec.kwargs.items())
+    first = CATALOGUE[env_id].family if env_id in CATALOGUE else "Car"
+    differs = env_id in {*CATALOGUE, *VEHICLE_ENVS} and short != first
     facts = {
         "made by": f'`gym.make("{env_id}")`',
         "with": f"`{given}`" if given else "",
         "time limit": f"{steps:,} steps" if steps else "none",
         "solved at a return of": "" if threshold is None else f"{threshold:,.0f}",
+        f"changes from {first}": f"`shapechanger envs compare {first} {short}`" if differs else "",
         "class": f"[`{module}.{name}`][{module}.{name}]",
     }
     content = _page(
@@ -123,7 +121,6 @@ def _environment(env_id: str) -> tuple[str, bytes | None]:
         f"![{short} at the start of an episode]({short}.jpg)" if picture else "",
         table(("property", "value"), [row for row in facts.items() if row[1]]),
         _described(f"{module}.{name}", "members: []", "show_bases: false", "heading_level: 1"),
-        certificate,
     )
     return content, picture
 
@@ -149,39 +146,6 @@ def _summary(env_id: str) -> str:
 def _loaded(entry_point: str) -> Any:
     module, _, name = entry_point.partition(":")
     return getattr(importlib.import_module(module), name)
-
-
-def _picture(env: gym.Env[Any, Any]) -> bytes:
-    """Draw the env at the start of an episode, as JPEG.
-
-    Raises:
-        RenderError: If nothing renders here.
-    """
-    import imageio.v3 as iio
-
-    env.reset(seed=0)
-    buffer = io.BytesIO()
-    frame = cast("Any", env.unwrapped).picture(*_SIZE)
-    iio.imwrite(buffer, frame, extension=".jpg", quality=_QUALITY)
-    return buffer.getvalue()
-
-
-def _certificate(env_id: str, env: gym.Env[Any, Any]) -> str:
-    """Return the section on the differences of an env from the first of its kind, if it has one.
-
-    Raises:
-        RenderError: If an env needs its camera, and nothing renders here.
-    """
-    first = CATALOGUE[env_id].family if env_id in CATALOGUE else "Car"
-    if env_id not in {*CATALOGUE, *VEHICLE_ENVS} or _short(env_id) == first:
-        return ""
-    with EnvRef(f"{NAMESPACE}/{first}-v1").make() as other:
-        try:
-            proven = str(cast("Any", other.unwrapped).certify_shift(other, env))
-        except EmptyShift as error:
-            proven = str(error)
-    command = f"shapechanger envs compare {first} {_short(env_id)}"
-    return f"## Certificate\n\nChanges from {first} (`{command}`):\n\n```text\n{proven}\n```"
 
 
 # Wiring

@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
@@ -47,18 +48,20 @@ class Device:
 
     title: str
     note: str  # A second line.
-    terminals: tuple[Terminal, ...]  # They face the Pi.
+    wires: Mapping[str, int | str]  # Pin or net of each terminal that faces the Pi, by label.
     parts: tuple[tuple[str, int, str], ...]  # Name, number and purpose.
-    loads: tuple[tuple[str, str], ...] = ()  # Labels of the other terminals, and what is there.
+    loads: Mapping[str, str] = field(default_factory=dict[str, str])  # At the other terminals.
+    pulls: Mapping[str, str] = field(default_factory=dict[str, str])  # By label, "" for all pins.
 
-
-def _wires(sources: Mapping[str, int | str], pull: str = "") -> tuple[Terminal, ...]:
-    """Return terminals, keyed by label, without pins that are not used; `pull` is for the pins."""
-    return tuple(
-        Terminal(label, source, pull if isinstance(source, int) else "")
-        for label, source in sources.items()
-        if source != NO_PIN
-    )
+    @property
+    def terminals(self) -> list[Terminal]:
+        """The terminals that face the Pi, without unused pins."""
+        pull = self.pulls.get("", "")
+        return [
+            Terminal(label, to, self.pulls.get(label, pull) if isinstance(to, int) else "")
+            for label, to in self.wires.items()
+            if to != NO_PIN
+        ]
 
 
 def _i2c(bus: int) -> dict[str, int | str]:
@@ -69,14 +72,14 @@ def _i2c(bus: int) -> dict[str, int | str]:
 
 def devices_of(profile: Profile) -> list[Device]:
     """Return the parts that are wired to the Pi, in the order of the diagram."""
-    outputs, sensors = profile.outputs, profile.sensors
+    outputs = profile.outputs
     bridges = [one for one in outputs if one.driver in ("hbridge", "phase_enable")]
     found = [_bridge(bridges[at : at + 2], profile) for at in range(0, len(bridges), 2)]
     if profile.enable_pin is not None:
         found.append(_one_shot(profile.enable_pin, profile.enable_hold_ms, bool(bridges)))
     found += [_direct(one) for one in outputs if one.settings.get("over") in ("lgpio", "sysfs")]
     if profile.stop_pin is not None:
-        wires = _wires({"contact": profile.stop_pin, "ground": GROUND})
+        wires = {"contact": profile.stop_pin, "ground": GROUND}
         parts = (("push button", 1, "emergency stop in the guard"),)
         found.append(Device("Emergency button", "pull-up in the Pi", wires, parts))
     boards: dict[tuple[int, int], list[OutputPlan]] = {}
@@ -84,22 +87,22 @@ def devices_of(profile: Profile) -> list[Device]:
         if one.settings.get("over") == "pca9685":
             key = one.settings["bus"], one.settings["address"]
             boards.setdefault(key, []).append(one)
-    found += [*map(_servo_board, boards.values()), *map(_sensor, sensors)]
+    found += map(_servo_board, boards.values())
+    found += [device for device in map(_sensor, profile.sensors) if device is not None]
     if servos := [one for one in outputs if one.driver == "bus_servo"]:
         found.append(_servo_bus(servos))
     if profile.camera is not None and profile.camera.driver in _CAMERAS:
         cable, part = _CAMERAS[profile.camera.driver]
-        found.append(Device("Camera", "", _wires({"cable": cable}), ((part, 1, "camera"),)))
-    found = [device for device in found if device.title]
+        found.append(Device("Camera", "", {"cable": cable}, ((part, 1, "camera"),)))
     speeds = any(one.driver == "esc" for one in outputs)
     if speeds or any(one.source == MOTORS for device in found for one in device.terminals):
+        plus = BATTERY if any(one.driver == "ina219" for one in profile.sensors) else MOTORS
         parts = (
             ("motor battery, with a fuse", 1, "never the Pi's 5 V"),
             ("latching switch", 1, "in the motors' supply: emergency stop without software"),
         )
-        plus = BATTERY if any(one.driver == "ina219" for one in sensors) else MOTORS
-        supply = (("+, fuse, switch", plus), ("-", GROUND))
-        found.append(Device("Battery", "with a fuse and a switch", (), parts, supply))
+        supply = {"+, fuse, switch": plus, "-": GROUND}
+        found.append(Device("Battery", "with a fuse and a switch", {}, parts, supply))
     return found
 
 
@@ -127,9 +130,9 @@ def _bridge(outputs: list[OutputPlan], profile: Profile) -> Device:
         ("H-bridge board, two channels (TB6612FNG, DRV8833; L298N above 6 V)", 1, "motors"),
         ("DC motor", len(outputs), ", ".join(one.part or one.name for one in outputs)),
     )
-    wires = _wires({**pins, "VM": MOTORS, "GND": GROUND}, pull=GROUND)
-    loads = tuple((f"OUT {'AB'[at]}", f"motor ({one.name})") for at, one in enumerate(outputs))
-    return Device("H-bridge", note, wires, parts, loads)
+    loads = {f"OUT {'AB'[at]}": f"motor ({one.name})" for at, one in enumerate(outputs)}
+    wires = {**pins, "VM": MOTORS, "GND": GROUND}
+    return Device("H-bridge", note, wires, parts, loads, {"": GROUND})
 
 
 # K of t = K R C at 1 uF, ms per kOhm; docs/hardware.md gives its source.
@@ -139,14 +142,15 @@ _HOLD_OF_KOHM_MS: Final = 0.45
 def _one_shot(pin: int, hold_ms: int, for_bridges: bool) -> Device:
     resistor = f"{float(f'{hold_ms / _HOLD_OF_KOHM_MS:.2g}'):g}"
     timing = {"2RCext": f"{resistor} kΩ to {LOGIC}", "2Cext": "1 µF to 2RCext"}
-    wires = _wires({"2B": pin, "2A": GROUND, "2RD": LOGIC, **timing}, pull=GROUND)
+    wires = {"2B": pin, "2A": GROUND, "2RD": LOGIC, **timing}
     parts = (
         ("74HC123", 1, "one-shot in the enable line"),
         (f"resistor {resistor} kOhm", 1, f"its time: {hold_ms} ms"),
         ("film or ceramic capacitor 1 uF", 1, "its time"),
     )
-    load = ENABLE if for_bridges else "MOSFET in the motors' supply"
-    return Device("One-shot 74HC123", f"drops after {hold_ms} ms", wires, parts, (("2Q", load),))
+    loads = {"2Q": ENABLE if for_bridges else "MOSFET in the motors' supply"}
+    note = f"drops after {hold_ms} ms"
+    return Device("One-shot 74HC123", note, wires, parts, loads, {"": GROUND})
 
 
 _ESC: Final = "speed controller (ESC) with its motor"
@@ -157,86 +161,81 @@ def _direct(output: OutputPlan) -> Device:
     name, settings = output.name, output.settings
     by_pin = settings["over"] == "lgpio"
     source = settings["pin"] if by_pin else f"PWM {settings['chip']}.{settings['channel']}"
-    signal = Terminal("signal", source, GROUND)
+    title, note, part = f"Servo ({name})", "V+ not from the Pi", "servo"
+    power, loads = {"V+": "5 to 6 V"}, {}
     if output.driver == "esc":
-        wires = (signal, *_wires({"battery +": MOTORS, "GND": GROUND}))
-        loads = (("motor wires", f"motor ({name})"),)
-        return Device(f"ESC ({name})", "BEC powers the servos", wires, ((_ESC, 1, name),), loads)
-    wires = (signal, *_wires({"V+": "5 to 6 V", "GND": GROUND}))
-    return Device(f"Servo ({name})", "V+ not from the Pi", wires, (("servo", 1, name),))
+        title, note, part = f"ESC ({name})", "BEC powers the servos", _ESC
+        power, loads = {"battery +": MOTORS}, {"motor wires": f"motor ({name})"}
+    wires = {"signal": source, **power, "GND": GROUND}
+    return Device(title, note, wires, ((part, 1, name),), loads, {"": GROUND})
 
 
 def _servo_board(outputs: list[OutputPlan]) -> Device:
     settings = outputs[0].settings
     enable = settings["output_enable"]
-    held = Terminal("OE", GROUND) if enable == NO_PIN else Terminal("OE", enable, LOGIC)
     motors = [one.name for one in outputs if one.driver == "esc"]
-    supply = "BEC of the ESC" if motors else "5 to 6 V supply"
-    wires = (*_wires(_i2c(settings["bus"])), held, Terminal("V+", supply))
+    wires = _i2c(settings["bus"]) | {"OE": GROUND if enable == NO_PIN else enable}
+    wires["V+"] = "BEC of the ESC" if motors else "5 to 6 V supply"
     parts = (
         ("PCA9685 board", 1, "pulses for servos"),
         (_ESC, len(motors), ", ".join(motors)),
         ("servo", len(outputs) - len(motors), "its channels"),
         ("servo supply, 5 to 6 V", int(not motors), "V+ of the board"),
     )
-    loads = tuple(
-        (
-            str(one.settings["channel"]),
-            f"ESC ({one.name}), + V MOTOR" if one.driver == "esc" else f"servo ({one.name})",
-        )
+    texts = {"esc": "ESC ({}), + V MOTOR"}
+    loads = {
+        str(one.settings["channel"]): texts.get(one.driver, "servo ({})").format(one.name)
         for one in outputs
+    }
+    return Device(
+        "PCA9685", f"address {settings['address']:#x}", wires, parts, loads, {"OE": LOGIC}
     )
-    return Device("PCA9685", f"address {settings['address']:#x}", wires, parts, loads)
 
 
 def _servo_bus(servos: list[OutputPlan]) -> Device:
     settings = servos[0].settings
-    wires = _wires({"USB": settings["device"], "supply": "servo supply", "GND": GROUND})
+    wires = {"USB": settings["device"], "supply": "servo supply", "GND": GROUND}
     parts = (
         ("USB adapter of the servo bus", 1, "with a latency timer of 1 ms"),
         (f"servo {settings['model']}", len(servos), "tendons"),
         ("spool", len(servos), f"radius {1e3 * settings['spool_radius_m']:g} mm"),
         ("servo supply, by the data sheet", 1, "never the Pi's 5 V"),
     )
-    loads = tuple(
-        ("", f"{one.name}: {one.settings['model']}, id {one.settings['id']}") for one in servos
-    )
+    loads = {f"id {one.settings['id']}": f"{one.name}: {settings['model']}" for one in servos}
     return Device("Servo bus", "daisy chain", wires, parts, loads)
 
 
-def _sensor(sensor: SensorPlan) -> Device:
-    """Return a sensor; one of an unknown driver, or of the servo bus, has no title."""
+def _sensor(sensor: SensorPlan) -> Device | None:
+    """Return a sensor; None for one of an unknown driver, or of the servo bus."""
     name, has = sensor.name, sensor.settings
-    board = has.get("address", has.get("mux", 0))
-    note, on_bus = f"address {board:#x}", _wires(_i2c(has["bus"])) if "bus" in has else ()
+    bus, note = _i2c(has.get("bus", 1)), f"address {has.get('address', has.get('mux', 0)):#x}"
     match sensor.driver:
         case "encoder":
-            wires = _wires({"A": has["a"], "B": has["b"], "VCC": LOGIC, "GND": GROUND})
+            wires = {"A": has["a"], "B": has["b"], "VCC": LOGIC, "GND": GROUND}
             parts = (("wheel encoder, open collector or 3.3 V", 1, name),)
             return Device(f"Encoder ({name})", "3.3 V maximum", wires, parts)
         case "switch":
-            pins = {f"contact {number}": pin for number, pin in enumerate(has["pins"], start=1)}
-            wires = _wires({**pins, "other side": GROUND if has["pull"] == "up" else LOGIC})
-            parts = (("switch", len(pins), f"{name}, in front"),)
+            wires = {f"contact {number}": pin for number, pin in enumerate(has["pins"], start=1)}
+            wires["other side"] = GROUND if has["pull"] == "up" else LOGIC
+            parts = (("switch", len(has["pins"]), f"{name}, in front"),)
             return Device(f"Switches ({name})", f"pull-{has['pull']} in the Pi", wires, parts)
         case "hcsr04":
-            echo = Terminal("Echo", has["echo"], DIVIDER)
-            power = _wires({"VCC": FIVE, "GND": GROUND})
-            wires = (Terminal("Trig", has["trigger"]), echo, *power)
-            return Device("HC-SR04", name, wires, (("HC-SR04", 1, f"distance: {name}"),))
+            wires = {"Trig": has["trigger"], "Echo": has["echo"], "VCC": FIVE, "GND": GROUND}
+            parts = (("HC-SR04", 1, f"distance: {name}"),)
+            return Device("HC-SR04", name, wires, parts, pulls={"Echo": DIVIDER})
         case "mpu6050":
-            return Device("MPU-6050", note, on_bus, (("MPU-6050 board", 1, name),))
+            return Device("MPU-6050", note, bus, (("MPU-6050 board", 1, name),))
         case "ina219":
-            loads = (("Vin+", BATTERY), ("Vin-", MOTORS))
-            return Device("INA219", note, on_bus, (("INA219 board", 1, name),), loads)
+            loads = {"Vin+": BATTERY, "Vin-": MOTORS}
+            return Device("INA219", note, bus, (("INA219 board", 1, name),), loads)
         case "as5600":
             rows = has["rows"].items()
-            loads = tuple((f"channel {row['channel']}", f"AS5600 {joint}") for joint, row in rows)
+            loads = {f"channel {row['channel']}": f"AS5600 {joint}" for joint, row in rows}
             magnets = ("AS5600 board with a diametric magnet", len(loads), "joints")
             parts = (("TCA9548A board", 1, "multiplexer of the encoders"), magnets)
-            return Device("TCA9548A", note, on_bus, parts, loads)
+            return Device("TCA9548A", note, bus, parts, loads)
         case _:
-            return Device("", "", (), ())
+            return None
 
 
 # Tables
@@ -267,11 +266,9 @@ def pin_table(profile: Profile) -> str:
     if not used:
         return "None: everything is on a bus or a cable."
     rows = [(f"GPIO{pin}", _POSITIONS[pin], "; ".join(used[pin])) for pin in sorted(used)]
-    *most, last = map(str, _GROUNDS)
-    grounds = (
-        f"Ground is position {', '.join(most)} or {last}; 3.3 V are 1 and 17, 5 V are 2 and 4."
-    )
-    return table(("pin", "position on the header", "connection"), rows) + f"\n\n{grounds}"
+    grounds = " or ".join(", ".join(map(str, _GROUNDS)).rsplit(", ", 1))
+    text = f"Ground is position {grounds}; 3.3 V are 1 and 17, 5 V are 2 and 4."
+    return table(("pin", "position on the header", "connection"), rows) + f"\n\n{text}"
 
 
 def part_list(profile: Profile) -> str:
@@ -286,12 +283,10 @@ def part_list(profile: Profile) -> str:
         ("resistor 2 kOhm", divided, "divider of the echo"),
         ("resistor 10 kOhm", len(pulls) - divided, "outputs are off until the guard runs"),
     )
-    counts: dict[str, int] = {}
-    purposes: dict[str, dict[str, None]] = {}
+    counts: Counter[tuple[str, str]] = Counter()
     for name, number, purpose in parts:
-        counts[name] = counts.get(name, 0) + number
-        purposes.setdefault(name, {})[purpose] = None
-    rows = [(name, count, "; ".join(purposes[name])) for name, count in counts.items() if count]
+        counts[name, purpose] += number
+    rows = [(name, count, purpose) for (name, purpose), count in counts.items() if count]
     return table(("part", "number", "for"), rows)
 
 
@@ -303,17 +298,11 @@ _ROW: Final = 1.0
 _TITLE: Final = 1.4
 _WIRE: Final = 2.6
 _INK: Final = "black"  # The page's colour takes its place.
-_COLOURS: Final = (
-    *("#d1495b", "#2e7dd1", "#2a9d4a", "#8e5cc9", "#b8740b", "#0d8f9c", "#c2408f", "#6b7f1e"),
-    *("#9c6b4f", "#5b6fb5", "#e0562b", "#4f8f7a"),
-)
 _NETS_OF_HEADER: Final = {1: LOGIC, 17: LOGIC, 2: FIVE, 4: FIVE} | dict.fromkeys(_GROUNDS, "GND")
 
 
 def draw_wiring(profile: Profile, name: str) -> str:
     """Return the wiring of a robot as an SVG element.
-
-    A wire carries the pin that it leads to, in the pin's colour; text and boxes have the page's.
 
     Args:
         profile: The profile.
@@ -321,15 +310,14 @@ def draw_wiring(profile: Profile, name: str) -> str:
     """
     schemdraw.use("svg")
     devices = devices_of(profile)
-    wires = (wire for device in devices for wire in device.terminals)
-    pins = list(dict.fromkeys(wire.source for wire in wires if isinstance(wire.source, int)))
-    colours = {pin: _COLOURS[at % len(_COLOURS)] for at, pin in enumerate(pins)}
+    sources = [wire.source for device in devices for wire in device.terminals]
+    pins = [source for source in sources if isinstance(source, int)]
     drawing = schemdraw.Drawing(
         show=False, fontsize=10, font="sans-serif", color=_INK, lw=1.3, margin=1.0
     )
     top = 0.0
     for device in devices:
-        top = _draw_device(drawing, device, top, colours)
+        top = _draw_device(drawing, device, top)
     if pins:
         named = _NETS_OF_HEADER | {_POSITIONS[pin]: f"GPIO{pin}" for pin in pins}
         left = [f"{named.get(at, '')}  {at}" for at in range(1, 41, 2)]
@@ -341,13 +329,11 @@ def draw_wiring(profile: Profile, name: str) -> str:
     return drawn.replace("<svg ", f'<svg class="wiring" role="img" aria-label="{title}" ', 1)
 
 
-def _draw_device(
-    drawing: schemdraw.Drawing, device: Device, top: float, colours: Mapping[int, str]
-) -> float:
+def _draw_device(drawing: schemdraw.Drawing, device: Device, top: float) -> float:
     """Draw a device, and return where the next one begins."""
 
-    def write(x: float, y: float, text: str, align: str, colour: str = _INK) -> None:
-        label = elm.Label().at((x, y)).theta(0).color(colour)
+    def write(x: float, y: float, text: str, align: str) -> None:
+        label = elm.Label().at((x, y)).theta(0)
         drawing.add(label.label(text, ofst=0, halign=cast("Any", align), valign="center"))
 
     edge, first = _BOX_X + _BOX_WIDTH, top - _TITLE
@@ -356,23 +342,20 @@ def _draw_device(
     write(_BOX_X + _BOX_WIDTH / 2, top - 0.4, device.title, "center")
     write(_BOX_X + _BOX_WIDTH / 2, top - 0.85, device.note, "center")
     for at, (label, source, pull) in enumerate(device.terminals):
-        y, colour, text = first - _ROW * at, _INK, str(source)
-        if isinstance(source, int):
-            colour, text = colours[source], f"GPIO{source} ({_POSITIONS[source]})"
-        end, middle = _BOX_X - _WIRE, _BOX_X - _WIRE / 2
-        drawing += elm.Line().at((_BOX_X, y)).to((end, y)).color(colour)
+        y, end, middle = first - _ROW * at, _BOX_X - _WIRE, _BOX_X - _WIRE / 2
+        is_pin = isinstance(source, int)
+        drawing += elm.Line().at((_BOX_X, y)).to((end, y))
         write(_BOX_X + 0.15, y, label, "left")
-        write(end - 0.15, y, text, "right", colour)
+        write(end - 0.15, y, f"GPIO{source} ({_POSITIONS[source]})" if is_pin else source, "right")
         if pull:
-            drawing += elm.Dot(radius=0.06).at((middle, y)).color(colour)
+            drawing += elm.Dot(radius=0.06).at((middle, y))
             drawing += elm.RBox().at((middle, y)).down().length(0.7).scale(0.4)
             resistor = f"2 kΩ to {GROUND}" if pull == DIVIDER else f"10 kΩ to {pull}"
             write(middle - 0.2, y - 0.45, resistor, "right")
         if pull == DIVIDER:
-            box = elm.RBox().at((_BOX_X, y)).left().length(_WIRE / 2)
-            drawing += box.scale(0.4).color(colour)
+            drawing += elm.RBox().at((_BOX_X, y)).left().length(_WIRE / 2).scale(0.4)
             write(_BOX_X - 0.15, y - 0.4, "1 kΩ", "right")
-    for at, (label, load) in enumerate(device.loads):
+    for at, (label, load) in enumerate(device.loads.items()):
         y = first - _ROW * at
         drawing += elm.Line().at((edge, y)).to((edge + 0.6, y))
         write(edge - 0.15, y, label, "right")
