@@ -10,6 +10,8 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
+import logging
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -387,3 +389,52 @@ def read_network(path: Path) -> tuple[PolicyCard, Network]:
     if (found := {side.name: list(side.shape[1:]) for side in sides}) != card.shapes:
         raise ValueError(f"its network takes and gives {found}, and its card says {card.shapes}")
     return card, lambda inputs: session.run(None, dict(inputs))[0]
+
+
+def export_network(
+    network: Any, inputs: Mapping[str, Any], card: PolicyCard, path: Path, **facts: str
+) -> None:
+    """Write a network of PyTorch as ONNX, with the card of its policy, without its settings.
+
+    Its `forward` takes the inputs in their order, each given by an example of shape (2, ...), whose
+    first axis stands for any number. The card's last shape names the output; facts are metadata.
+
+    Raises:
+        MissingExtra: If onnx or onnxscript is not installed.
+        OutputError: If the file cannot be written.
+    """
+    with translate_errors(ImportError, to=lambda _: MissingExtra("onnxscript", "onnx")):
+        operators: Any = import_module("onnxscript").opset18
+    torch: Any = import_module("torch")
+
+    def hypot(x: Any, y: Any) -> Any:
+        """Translate the length of an edge, which ONNX lacks."""
+        return operators.Sqrt(operators.Add(operators.Mul(x, x), operators.Mul(y, y)))
+
+    many = torch.export.Dim("n", min=1)
+    log = logging.getLogger("torch.onnx")
+    level = log.level
+    log.setLevel(logging.ERROR)  # The exporter warns of packages that these networks do not need.
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            program = torch.onnx.export(
+                network.eval(),
+                tuple(inputs.values()),
+                input_names=[*inputs],
+                output_names=[[*card.shapes][-1]],
+                dynamic_shapes=(tuple({0: many} for _ in inputs),),
+                opset_version=18,
+                custom_translation_table={torch.ops.aten.hypot.default: hypot},
+                dynamo=True,
+                verbose=False,
+            )
+    finally:
+        log.setLevel(level)
+    model = program.model_proto
+    text = msgspec.json.encode(msgspec.structs.replace(card, settings=None)).decode()
+    for name, value in {**facts, ONNX_CARD: text}.items():
+        entry = model.metadata_props.add()
+        entry.key, entry.value = name, value
+    make_folder(path.parent)
+    write_atomic(path, model.SerializeToString())

@@ -17,8 +17,7 @@ from torch import Tensor, nn
 
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.errors import StudyError, TransplantError
-from shapechanger.onnx_file import export_network
-from shapechanger.policy import PolicyCard
+from shapechanger.policy import PolicyCard, export_network
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.identities import identities_in
 from shapechanger.transfer.learners.policy_file import TrainedPolicy

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from shapechanger.demos.cloning.clone import Clone, CloneSettings, prepared
 from shapechanger.errors import MissingExtra
 from shapechanger.layout import Layout
-from shapechanger.onnx_file import export_network
-from shapechanger.policy import STEERING, CloneNetwork, PolicyCard
+from shapechanger.policy import STEERING, CloneNetwork, PolicyCard, export_network
 
 try:
     import torch
