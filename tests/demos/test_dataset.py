@@ -85,8 +85,8 @@ def test_the_drivers_are_chosen_by_name(tmp_path: Path) -> None:
     ("changes", "what"),
     [
         ({"control_hz": 10.0}, "steps a second"),
-        ({"action_layout": STATES.to_json()}, "actions"),
-        ({"state_layout": ACTIONS.to_json()}, "states"),
+        ({"action_layout": STATES}, "actions"),
+        ({"state_layout": ACTIONS}, "states"),
         ({"image_size": None}, "pictures"),
     ],
 )

@@ -15,7 +15,6 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import export_recording, import_recording
 from shapechanger.demos.jpeg import decode_picture, encode_picture
-from shapechanger.layout import Layout
 
 # LeRobot's default reader needs an FFmpeg of the system.
 READER = "pyav"
@@ -153,7 +152,7 @@ def test_we_read_what_lerobot_writes(tmp_path: Path, kind: str) -> None:
     assert (done.format, done.episodes, done.steps) == ("lerobot", 2, 29)
     episodes = all_of(tmp_path / "data")
     assert [episode.header.notes["task"] for episode in episodes] == ["Pick.", "Place."]
-    assert Layout.from_json(episodes[0].header.action_layout).names == tuple(names)
+    assert episodes[0].header.action_layout.names == tuple(names)
     assert episodes[0].header.control_hz == 15.0
     steps = [(episode, step) for episode in episodes for step in episode.steps]
     for (episode, step), (action, state, pixels) in zip(steps, expected, strict=True):

@@ -210,7 +210,7 @@ def _part(
                 "steps with `shapechanger demos bad`."
             )
         periods_s = apart[np.diff(indices) == 1].tolist()
-    layout = header.states if header.state_layout else None
+    layout = header.state_layout or None
     part = Dataset(
         pictures=np.stack(pictures) if pictures else None,
         states=np.array([step.state for step in chosen], np.float32) if layout else None,
@@ -218,7 +218,7 @@ def _part(
         episodes=(len(chosen),),
         times_s=times_s,
         files=tuple(f"{name}, step {step.index}" for step in chosen),
-        action_layout=header.actions,
+        action_layout=header.action_layout,
         state_layout=layout,
         control_hz=header.control_hz,
         body=header.body,

@@ -175,8 +175,8 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         has_clock = self._seen["captured_ns"] is not None
         fields: dict[str, Any] = {
             **{name: getattr(robot, name) for name in facts if hasattr(robot, name)},
-            "action_layout": self._encoder.action_layout.to_json(),
-            "state_layout": layout.to_json() if layout else "",
+            "action_layout": self._encoder.action_layout,
+            "state_layout": layout or Layout(()),
             "image_size": picture_size(self._jpeg, "from the env") if self._jpeg else None,
             "control_hz": float(self.env.metadata.get("render_fps") or 20.0),
             "env": spec.id if spec else "",

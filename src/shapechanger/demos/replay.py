@@ -35,12 +35,12 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
     kwargs = header.env_kwargs if ref.id == header.env else {}
     with closing(EnvRef(ref.id, {**kwargs, **ref.kwargs}).make(max_episode_steps=-1)) as env:
         encoder = ObservationEncoder(env)
-        layouts = encoder.action_layout, header.actions
+        layouts = encoder.action_layout, header.action_layout
         moved, recorded = ([(f.name, f.unit, f.shape) for f in layout] for layout in layouts)
         if moved != recorded:
             raise DemosError(
                 f"{ref} moves {', '.join(encoder.action_layout.names)}, and {episode.path.name} "
-                f"was recorded with {', '.join(header.actions.names)}."
+                f"was recorded with {', '.join(header.action_layout.names)}."
             )
         options = cast("Any", header.notes.get("reset_options"))
         observation, info = env.reset(seed=header.seed, options=options)
@@ -48,7 +48,7 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
         while not over and played < len(kept):
             step = kept[played]
             jpeg, state = encoder.encode(observation, info)
-            if encoder.state_layout == header.states:  # Other layouts cannot be compared.
+            if encoder.state_layout == header.state_layout:  # Other layouts cannot be compared.
                 states.append(np.abs(np.subtract(state, step.state)))
             if (before := episode.jpeg(step)) is not None and jpeg is not None:
                 old, new = decode_picture(before, step.frame), decode_picture(jpeg, "of the env")
@@ -68,7 +68,7 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
         said.append("dropped steps were not played, so later steps start elsewhere")
     if any(step.applied is None for step in kept):
         said.append("applied actions are unknown, so the decided ones were played")
-    differences = list(_differences(header.states, images, np.array(states), rewards))
+    differences = list(_differences(header.state_layout, images, np.array(states), rewards))
     return said + (differences or ["nothing to compare"])
 
 
@@ -98,7 +98,7 @@ def _differences(
 def write_episode_film(episode: Episode, path: Path) -> str:
     """Write the kept steps of an episode as a video, and return a sentence on it."""
     require_film(path)
-    layout = episode.header.actions
+    layout = episode.header.action_layout
     frames: list[NDArray[Any]] = []
     for step in episode.kept:
         picture = np.full(_WITHOUT_CAMERA, BACKGROUND, np.uint8)

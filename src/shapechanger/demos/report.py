@@ -62,10 +62,10 @@ def distributions(episodes: Sequence[Episode]) -> list[Distribution]:
         found.setdefault((feature.name, feature.unit), (feature, []))[1].extend(values)
 
     for one in episodes:
-        layout = one.header.actions
+        layout = one.header.action_layout
         for name, place in list(layout.slices.items())[:_MAX_ACTIONS]:
             add(layout[name], (value for step in one.kept for value in step.action[place]))
-        layout, places = one.header.states, one.header.states.slices
+        layout, places = one.header.state_layout, one.header.state_layout.slices
         for name in filter(places.get, _MEASURED):
             values = (value for step in one.kept for value in step.state[places[name]])
             add(Feature(name, layout[name].unit), values)
@@ -135,7 +135,7 @@ def _histogram(found: Distribution) -> dict[str, Any]:
 
 def _timeline(episode: Episode) -> dict[str, Any]:
     """Return the drivers, and up to `_MAX_POINTS` points of each action, from -1 to 1."""
-    layout, first = episode.header.actions, episode.steps[0].index
+    layout, first = episode.header.action_layout, episode.steps[0].index
     runs: list[tuple[int, int, str]] = []
     for who, run in groupby(episode.steps, lambda step: _who(episode, step)):
         indexes = [step.index for step in run]

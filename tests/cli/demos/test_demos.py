@@ -27,6 +27,7 @@ from shapechanger.demos.episodes import (
     read_episode,
 )
 from shapechanger.errors import DemosError, OutputError, PolicyError
+from shapechanger.layout import Layout
 from shapechanger.policy import load_policy
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.cli.running import Cli
@@ -116,7 +117,7 @@ def test_cut_bad_good_mark(data: Path, demos: Cli) -> None:
 
 def test_merge(data: Path, tmp_path: Path, demos: Cli) -> None:
     """Different layouts are reported; duplicates are refused."""
-    other = header(state_layout="")
+    other = header(state_layout=Layout(()))
     with EpisodeWriter.create(tmp_path / "other", other, spare_bytes=0) as writer:
         writer.add(step(state=()))
     out = tmp_path / "all"
@@ -354,7 +355,7 @@ def _record(folder: Path, n: int, seed: int, layout: object = KEYS) -> Path:
     """Record an episode as a person would drive it."""
     chosen = STEERS if layout is STEERS else KEYS
     data = stripes(n, seed, chosen)
-    header = EpisodeHeader(action_layout=chosen.to_json(), image_size=(50, 33), clock="none")
+    header = EpisodeHeader(action_layout=chosen, image_size=(50, 33), clock="none")
     assert data.pictures is not None
     with EpisodeWriter.create(folder, header) as writer:
         for picture, action in zip(data.pictures, data.actions, strict=True):

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
+from shapechanger.layout import Layout
 from shapechanger.robot.client.known_robots import KnownRobot, remember
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from tests.cli.robot.typing import Person
@@ -33,7 +34,9 @@ def forward(folder: Path, robot: RunningRobot, seconds: float, **changes: object
     with robot.client(role="person") as client:
         welcome = client.welcome
     about = EpisodeHeader(
-        action_layout=welcome.action_layout, control_hz=welcome.control_hz, robot="car"
+        action_layout=Layout.from_json(welcome.action_layout),
+        control_hz=welcome.control_hz,
+        robot="car",
     )
     about = replace(about, **changes)
     with EpisodeWriter.create(folder / "data", about, spare_bytes=0) as writer:
@@ -107,7 +110,7 @@ def test_an_episode_that_does_not_fit_the_robot_is_refused(
         assert terminal.end() == 2
     with robot.client(role="person") as client:
         layout = client.welcome.action_layout.replace('"low":-1.0', '"low":-0.5', 1)
-    other = forward(tmp_path / "other", robot, 0.2, action_layout=layout)
+    other = forward(tmp_path / "other", robot, 0.2, action_layout=Layout.from_json(layout))
     with person(other, tmp_path) as terminal:
         terminal.read_until("was recorded with steering [1] from -0.5 to 1")
         assert terminal.end() == 2

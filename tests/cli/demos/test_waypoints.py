@@ -51,8 +51,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def _record(folder: Path, n: int = 60, *, state: Layout | None = _STATE, **changes: Any) -> Path:
     """Record a car as a person would drive it; it stands for the first ten steps."""
     fields: dict[str, Any] = {
-        "action_layout": _ACTIONS.to_json(),
-        "state_layout": "" if state is None else state.to_json(),
+        "action_layout": _ACTIONS,
+        "state_layout": state or Layout(()),
         "image_size": (160, 120),
         "body": "car",
         "camera_pitch_deg": 0.0,
@@ -167,9 +167,9 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
         ({"camera_pitch_deg": None}, "does not state pitch and field of view .* give --camera"),
         ({"camera_fovy_deg": 0.0}, "from 0 to 180, got 0 and 0"),
         ({"camera_fovy_deg": 20.0}, "misses"),
-        ({"action_layout": ACTION_LAYOUT.to_json()}, "leave out --waypoints"),
+        ({"action_layout": ACTION_LAYOUT}, "leave out --waypoints"),
         (
-            {"action_layout": Layout((Feature("left", "1"), Feature("right", "1"))).to_json()},
+            {"action_layout": Layout((Feature("left", "1"), Feature("right", "1")))},
             "have the actions left, right",
         ),
     ],
@@ -189,7 +189,7 @@ def test_several_bodies_and_no_pictures_are_refused(tmp_path: Path) -> None:
     _record(tmp_path / "two", body="truck")
     with pytest.raises(DemosError, match="several bodies, car, truck"):
         _loaded(tmp_path / "two")
-    header = EpisodeHeader(action_layout=_ACTIONS.to_json(), clock="none")
+    header = EpisodeHeader(action_layout=_ACTIONS, clock="none")
     with EpisodeWriter.create(tmp_path / "blind", header) as writer:
         writer.add(Step(action=(0.0, 0.5), driver="person"))
         writer.close()

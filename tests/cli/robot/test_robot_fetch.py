@@ -29,7 +29,7 @@ from tests.robot.daemon.plans import ACTIONS, picture
 
 pytestmark = pytest.mark.realtime
 
-HEADER = EpisodeHeader(action_layout=ACTIONS.to_json(), driver="Ada")
+HEADER = EpisodeHeader(action_layout=ACTIONS, driver="Ada")
 
 
 @pytest.fixture

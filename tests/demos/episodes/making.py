@@ -13,8 +13,8 @@ STATES = Layout((Feature("effort", "N·m"), Feature("distance", "m", 0.0)))
 def header(**changes: Any) -> EpisodeHeader:
     """Return the header of a car's episode."""
     fields: dict[str, Any] = {
-        "action_layout": ACTIONS.to_json(),
-        "state_layout": STATES.to_json(),
+        "action_layout": ACTIONS,
+        "state_layout": STATES,
         "image_size": (160, 120),
         "robot": "car",
     }

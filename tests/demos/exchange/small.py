@@ -57,8 +57,8 @@ def huge(width: int = 60_000, height: int = 60_000) -> bytes:
 def header(**changes: Any) -> EpisodeHeader:
     """Return the header of a car with a camera and a state."""
     fields: dict[str, Any] = {
-        "action_layout": ACTIONS.to_json(),
-        "state_layout": STATES.to_json(),
+        "action_layout": ACTIONS,
+        "state_layout": STATES,
         "image_size": (40, 32),
         "driver": "Ada",
         "notes": {"place": "Flur, 2. Stock: ö, 日本"},

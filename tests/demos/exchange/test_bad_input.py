@@ -15,6 +15,7 @@ import pytest
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import export_recording, import_recording
 from shapechanger.errors import DemosError, OutputError, ShapechangerError, UnknownName
+from shapechanger.layout import Layout
 from tests.demos.exchange.small import (
     all_of,
     content_of,
@@ -186,7 +187,7 @@ def _with_rest(text: str) -> Callable[[Path], None]:
         ("keys", _table(b"backward", b"forward"), "two columns of one name"),
         ("csv", _edit("header.json", lambda t: t[:40]), "not valid JSON"),
         ("csv", _swap("header.json", b'"format": 1', b'"format": 9'), "format 9"),
-        ("csv", _swap("header.json", b'"unit"', b'"u"'), "not a layout"),
+        ("csv", _swap("header.json", b'"unit"', b'"u"'), "missing required field `unit`"),
         (
             "csv",
             _edit("header.json", lambda t: re.sub(rb"\[\s+40,\s+32\s+]", b"null", t)),
@@ -301,7 +302,7 @@ def test_nothing_to_export(tmp_path: Path) -> None:
     record(tmp_path / "data", header(), [])
     with pytest.raises(DemosError, match="nothing to export"):
         export_recording(tmp_path / "data", tmp_path / "csv", "csv")
-    bare = header(image_size=None, state_layout="")
+    bare = header(image_size=None, state_layout=Layout(()))
     record(tmp_path / "bare", bare, [(Step(action=(0.0, 0.0), driver="person"), None)])
     with pytest.raises(DemosError, match="neither images nor a state"):
         export_recording(tmp_path / "bare", tmp_path / "out-v0", "minari")

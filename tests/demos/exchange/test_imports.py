@@ -24,7 +24,6 @@ from shapechanger.demos.exchange import (
     import_recording,
 )
 from shapechanger.errors import DemosError
-from shapechanger.layout import Layout
 from tests.demos.exchange.small import (
     all_of,
     drive,
@@ -43,7 +42,7 @@ def test_a_table_of_others(tmp_path: Path) -> None:
     done = import_recording(folder, tmp_path / "data")
     assert (done.episodes, done.steps, done.pictures) == (1, 3, 3)
     (episode,) = all_of(tmp_path / "data")
-    layout = Layout.from_json(episode.header.action_layout)
+    layout = episode.header.action_layout
     assert layout.names == ("forward", "backward", "right", "left")
     assert {(feature.low, feature.high) for feature in layout} == {(0.0, 1.0)}
     assert [step.action for step in episode.steps] == [(1, 0, 0, 0), (0, 0, 0, 1), (0, 0, 0, 0)]
@@ -68,7 +67,7 @@ def test_a_table_of_others_with_states(tmp_path: Path) -> None:
     assert "note: Columns that are not imported: lap." in text
     assert "line 4 of table, line 5 of table: it is invalid (Expected `float`" in text
     (episode,) = all_of(tmp_path / "data")
-    assert Layout.from_json(episode.header.action_layout).names == ("steering", "throttle")
+    assert episode.header.action_layout.names == ("steering", "throttle")
     assert [step.action for step in episode.steps] == [(0.5, 1.0), (-1.0, 0.0)]
     assert episode.steps[0].state == (2.25,)
     assert [step.terminated for step in episode.steps] == [False, True]
@@ -104,7 +103,7 @@ def test_a_tub(tmp_path: Path) -> None:
     assert [step.wall_ns for step in first.steps] == [1_000_000_000, 1_100_000_000]
     assert [step.action for step in second.steps] == [(0.5, 1.0), (-0.5, 1.0)]
     assert [step.driver for step in second.steps] == ["person", "policy"]
-    assert Layout.from_json(second.header.state_layout).names == ("imu/gyr_z",)
+    assert second.header.state_layout.names == ("imu/gyr_z",)
     assert math.isnan(second.steps[0].state[0])
     assert second.steps[1].state == (2.5,)
     assert second.header.notes == {"session": "21-06-25_1"}
@@ -200,8 +199,8 @@ def test_states_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.Mon
     )
     (episode,) = import_episodes(path)
     head = episode.header
-    assert Layout.from_json(head.state_layout).names == ("at", "goal/0", "goal/1")
-    (action,) = Layout.from_json(head.action_layout)
+    assert head.state_layout.names == ("at", "goal/0", "goal/1")
+    (action,) = head.action_layout
     assert (action.low, action.high) == (1.0, 3.0)
     read = [record.step for record in episode.records]
     assert [step.action for step in read] == [(1.0,), (2.0,), (3.0,)]

@@ -140,7 +140,7 @@ def test_missing_values_and_odd_rates(tmp_path: Path) -> None:
         (Step(action=(0.0, 0.0), driver="person", state=(np.nan, 1.0, np.inf, 3.0)), None),
         (Step(action=(0.0, 0.0), driver="person", state=(1.0,) * 4, reward=1.0), None),
     ]
-    what = header(state_layout=layout.to_json(), image_size=None, control_hz=12.5)
+    what = header(state_layout=layout, image_size=None, control_hz=12.5)
     record(tmp_path / "data", what, steps)
     export_recording(tmp_path / "data", tmp_path / "out", "lerobot")
     info = json.loads((tmp_path / "out/meta/info.json").read_text())

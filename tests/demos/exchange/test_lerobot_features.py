@@ -12,7 +12,6 @@ import pytest
 
 from shapechanger.demos.exchange import import_recording
 from shapechanger.errors import DemosError, UnknownName
-from shapechanger.layout import Layout
 from tests.demos.exchange.lerobot_set import (
     CAMERA,
     DATA,
@@ -130,7 +129,7 @@ def test_names_and_units_of_values(
     assert about.notes == {"dataset": "set", "task": "drive"}
     assert {step.driver for step in episode.steps} == {"person"}
     assert about.created == ""  # Unknown.
-    layout = Layout.from_json(about.action_layout)
+    layout = about.action_layout
     assert (layout.names, [feature.unit for feature in layout]) == (expected, ["rad", "deg"])
     assert ("names of action do not fit its 2 values" in findings_of(done)) == noted
 

@@ -57,7 +57,7 @@ def exported(tmp_path: Path) -> Path:
         ),
     ]
     with EpisodeWriter.create(
-        tmp_path / "data", header(state_layout=layout.to_json(), control_hz=10.0)
+        tmp_path / "data", header(state_layout=layout, control_hz=10.0)
     ) as writer:
         for n, step in enumerate(steps):
             writer.add(step, None if n == 1 else picture(n))
@@ -116,7 +116,7 @@ def test_unknown_times_fit_the_known_ones(
     tmp_path: Path, clock_ns: list[int | None], expected_ns: list[int]
 ) -> None:
     with EpisodeWriter.create(
-        tmp_path / "data", header(state_layout="", image_size=None, control_hz=10.0)
+        tmp_path / "data", header(state_layout=Layout(()), image_size=None, control_hz=10.0)
     ) as writer:
         for n, at in enumerate(clock_ns):
             at_ns = None if at is None else at * 10**6

@@ -16,7 +16,6 @@ from minari.serialization import serialize_space
 
 from shapechanger.demos.exchange import ImportContext, import_recording
 from shapechanger.demos.exchange.minari import FORMAT
-from shapechanger.layout import Layout
 from tests.demos.exchange.small import all_of, findings_of, read_whole
 
 STATE = gym.spaces.Box(-1.0, 1.0, (2,))
@@ -145,7 +144,7 @@ def test_parts_of_observations_are_imported_or_named(tmp_path: Path) -> None:
     done = import_recording(write_set(tmp_path / "set", observed), tmp_path / "back")
     assert done.pictures == 2 * STEPS
     header = all_of(tmp_path / "back")[0].header
-    assert Layout.from_json(header.state_layout).names == ("near/0", "near/1")
+    assert header.state_layout.names == ("near/0", "near/1")
     note, line = sorted(findings_of(done).splitlines()[:2], reverse=True)
     assert line.endswith("no or more than 131072 values, or images of depth")
     assert all(f"observation {name} (Box " in line for name in ("depth", "flat", "points"))

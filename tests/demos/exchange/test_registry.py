@@ -25,7 +25,7 @@ LAYOUT = Layout((Feature("speed", "m/s"),))
 
 
 def read(folder, context):
-    header = EpisodeHeader(action_layout=LAYOUT.to_json(), control_hz=context.hz or 10.0)
+    header = EpisodeHeader(action_layout=LAYOUT, control_hz=context.hz or 10.0)
     records = []
     for line in (folder / "speeds.txt").read_text().split():
         try:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import DRIVERS, Drop, EpisodeWriter, Step, edit
 from shapechanger.demos.exchange import export_recording, import_recording
+from shapechanger.layout import Layout
 from tests.demos.exchange.small import (
     all_of,
     content_of,
@@ -100,7 +101,7 @@ def test_any_recording_round_trips(
     data: st.DataObject,
 ) -> None:
     steps = data.draw(_steps(image, state, grey))
-    head |= {"image_size": image} | ({} if state else {"state_layout": ""})
+    head |= {"image_size": image} | ({} if state else {"state_layout": Layout(())})
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         with EpisodeWriter.create(place / "data", header(**head)) as writer:

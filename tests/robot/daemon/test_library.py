@@ -32,7 +32,7 @@ from shapechanger.robot.link.messages import (
 )
 from tests.robot.daemon.plans import ACTIONS, picture
 
-HEADER = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
+HEADER = EpisodeHeader(action_layout=ACTIONS, control_hz=10.0, driver="Ada")
 Ask = Callable[[Question], Answer]
 
 

@@ -30,7 +30,7 @@ from tests.robot.daemon.running import Client, Running, until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.plan(recordings="kept", arming="anyone")]
 
-HEADER = EpisodeHeader(action_layout=ACTIONS.to_json())
+HEADER = EpisodeHeader(action_layout=ACTIONS)
 
 
 async def recording(client: Client, on: bool = True) -> RecorderState:

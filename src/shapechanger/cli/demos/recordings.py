@@ -432,8 +432,8 @@ def _recording_card(episodes: list[Episode], hashes: dict[str, str], repo: str) 
         "Demonstrations, recorded with Shapechanger.",
         rows,
         {
-            "State": hub.features_text(header.states if header.state_layout else None, "none"),
-            "Action": hub.features_text(header.actions),
+            "State": hub.features_text(header.state_layout or None, "none"),
+            "Action": hub.features_text(header.action_layout),
         },
         header.source,
         f"shapechanger demos pull {repo} --out data",

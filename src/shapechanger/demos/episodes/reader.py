@@ -247,7 +247,7 @@ def _checked_lines(
         content = read_file(path / STEPS, MAX_TEXT_BYTES)
     except OSError as error:
         raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
-    sizes = header.actions.size, header.states.size
+    sizes = header.action_layout.size, header.state_layout.size
     newest, sound = -1, None  # Index of the newest step, and the newest image that is sound.
     for raw in io.BytesIO(content):
         line, wrong = None, ""

@@ -11,7 +11,7 @@ import os
 import re
 import stat
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, cast
 
@@ -90,6 +90,7 @@ Clock = Literal["real", "twin", "none"]
 _Pixels = Annotated[int, Meta(ge=1)]
 # A stack of four grey images of 84 x 84, as state, is 28 224 values.
 _MAX_VALUES: Final = 1 << 17
+_NO_STATES: Final = Layout(())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,8 +98,8 @@ class EpisodeHeader:
     """Metadata of an episode.
 
     Attributes:
-        action_layout: JSON of the `Layout` of the actions.
-        state_layout: JSON of the `Layout` of the states; "" without states.
+        action_layout: Meaning of the values of an action.
+        state_layout: Meaning of the values of a state; empty without states.
         image_size: Width and height of the images in pixels; None without images.
         control_hz: Steps per second.
         robot: Name of the robot.
@@ -118,12 +119,11 @@ class EpisodeHeader:
         format: Version of the format.
 
     Raises:
-        DemosError: If a layout has no action, or too many values.
-        LayoutError: If a layout is invalid.
+        DemosError: If there is no action, or a layout has too many values.
     """
 
-    action_layout: str
-    state_layout: str = ""
+    action_layout: Layout
+    state_layout: Layout = _NO_STATES
     image_size: tuple[_Pixels, _Pixels] | None = None
     control_hz: Annotated[float, Meta(ge=1e-3, le=1e6)] = 20.0
     robot: str = ""
@@ -143,25 +143,15 @@ class EpisodeHeader:
 
     def __post_init__(self) -> None:
         # A few bytes can describe more values than any memory holds.
-        if not 1 <= self.actions.size <= _MAX_VALUES >= self.states.size:
+        if not 1 <= self.action_layout.size <= _MAX_VALUES >= self.state_layout.size:
             raise DemosError(
                 f"action_layout must have a value, and each layout at most {_MAX_VALUES} values."
             )
 
-    @property
-    def actions(self) -> Layout:
-        """Meaning of the values of an action."""
-        return Layout.from_json(self.action_layout)
-
-    @property
-    def states(self) -> Layout:
-        """Meaning of the values of a state; empty without states."""
-        return Layout.from_json(self.state_layout) if self.state_layout else Layout(())
-
     def to_json(self) -> dict[str, Any]:
-        """Return the header as JSON can hold it, with the layouts expanded for readability."""
-        layouts = {"action_layout": self.action_layout, "state_layout": self.state_layout or "null"}
-        return asdict(self) | {name: json.loads(text) for name, text in layouts.items()}
+        """Return the header as JSON can hold it; the layout of no states is None."""
+        fields = msgspec.to_builtins(self)
+        return fields if self.state_layout else fields | {"state_layout": None}
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> EpisodeHeader:
@@ -175,13 +165,9 @@ class EpisodeHeader:
                 f"The episode has format {plain.get('format')}, but this version of Shapechanger "
                 f"reads format {_FORMAT} only."
             )
-        layouts = {
-            name: json.dumps(plain[name], separators=(",", ":"), ensure_ascii=False)
-            for name in ("action_layout", "state_layout")
-            if plain.get(name)
-        }
+        fields = {name: value for name, value in plain.items() if name != "state_layout" or value}
         try:
-            return msgspec.convert(plain | {"state_layout": ""} | layouts, cls)
+            return msgspec.convert(fields, cls)
         except msgspec.ValidationError as error:
             raise DemosError(f"The header is invalid ({error}).") from error
 

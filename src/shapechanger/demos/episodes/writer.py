@@ -76,7 +76,7 @@ class EpisodeWriter:
         self.path = path
         self.steps = self.dropped = self.marks = 0
         self._header = header
-        self._sizes = header.actions.size, header.states.size
+        self._sizes = header.action_layout.size, header.state_layout.size
         self._held, self._file = files
         self._spare_bytes = spare_bytes
         self._bytes = 0

@@ -25,7 +25,7 @@ from shapechanger.demos.episodes.records import longest_period_s
 from shapechanger.demos.exchange.files import load_jpeg
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError, UnknownName
-from shapechanger.layout import Feature, Layout
+from shapechanger.layout import Feature
 
 FORMATS: Final = ("csv", "minari", "lerobot", "tub", "mcap")
 _NAMES: Final = """
@@ -210,8 +210,8 @@ class Format:
             format cannot be exported.
         options: Options that it takes: "camera" and "hz" on import; "task", "images" and "dropped"
             (excluded steps, marked as such) on export.
-        common: What all episodes of a dataset have in common: "actions", "states", "image_size" and
-            "control_hz" of their headers.
+        common: What all episodes of a dataset have in common, as names of fields of their
+            headers, such as "action_layout".
         consecutive: Whether each step follows the one before, so that an export splits episodes.
         timed: Whether it keeps the times of steps.
     """
@@ -425,11 +425,6 @@ def features_of(
         return [Feature(key, unit, min(lows), max(highs), shape=(size,))]
     names = names or ([f"{key}/{n}" for n in range(size)] if size > 1 else [key])
     return [Feature(*about) for about in zip(names, units, lows, highs, strict=True)]
-
-
-def as_json(features: Sequence[Feature]) -> str:
-    """Return features as the layout of a header; "" for none."""
-    return Layout(tuple(features)).to_json() if features else ""
 
 
 def choose_camera(folder: Path, cameras: Sequence[str], context: ImportContext) -> str:

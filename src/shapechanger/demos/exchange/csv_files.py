@@ -24,7 +24,7 @@ import msgspec
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange import base, files
 from shapechanger.errors import DemosError, translate_errors
-from shapechanger.layout import value_names
+from shapechanger.layout import Layout, value_names
 
 _TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
@@ -54,7 +54,7 @@ def _tables_of(folder: Path) -> list[Path]:
 
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
-    actions, states = value_names(header.actions), value_names(header.states)
+    actions, states = value_names(header.action_layout), value_names(header.state_layout)
     values = dict.fromkeys(_VECTORS, actions) | {"state": states}
     return {
         field: [name + value for value in values.get(field, [""])] for field, name in _NAMES.items()
@@ -145,14 +145,11 @@ def _others(
         raise DemosError(f"{path} has two columns of one name: rename one of them.")
     if others := known.keys() - set(chain.from_iterable(columns.values())):
         context.report("note", f"Columns that are not imported: {', '.join(sorted(others))}.")
-    layouts: list[str] = []
+    layouts: list[Layout] = []
     for field in ("action", "state"):
         values = [name.removeprefix(_NAMES[field]) for name in columns[field]]
-        layouts.append(
-            base.as_json(
-                [base.COMMANDS.get(name) or base.features_of(name, 1)[0] for name in values]
-            )
-        )
+        features = (base.COMMANDS.get(name) or base.features_of(name, 1)[0] for name in values)
+        layouts.append(Layout(tuple(features)))
     header = EpisodeHeader(action_layout=layouts[0], state_layout=layouts[1], source="csv")
     records = _records(path.parent, list(known), lines, columns, known)
     for part, head in base.drives([records], header, context):

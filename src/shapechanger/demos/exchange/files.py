@@ -227,9 +227,9 @@ def own_episodes(
         drivers = chain.from_iterable(repeat(driver, count) for driver, count in runs)
         outcome = str(fields.get("outcome", ""))
         episodes.append((header, outcome, cast("Iterator[Driver]", drivers)))
-    kinds = {(h.actions.size, h.states.size, h.image_size) for h, *_ in episodes}
+    kinds = {(h.action_layout.size, h.state_layout.size, h.image_size) for h, *_ in episodes}
     if found is not None:
-        kinds.add((found.actions.size, found.states.size, found.image_size))
+        kinds.add((found.action_layout.size, found.state_layout.size, found.image_size))
     if len(episodes) != count or (found is not None and len(kinds) > 1):
         raise DemosError(f"{where} is of another dataset: remove it if the dataset was edited.")
     return episodes

@@ -32,7 +32,7 @@ from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OUR
 from shapechanger.demos.exchange.video import VideoTimes, read_pictures, read_times
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError
-from shapechanger.layout import Feature
+from shapechanger.layout import Feature, Layout
 
 _ACTION, _STATE, _REWARD, _TERMINATED = (
     base.COLUMNS[field]["lerobot"] for field in ("action", "state", "reward", "terminated")
@@ -366,7 +366,7 @@ def _flat_names(plain: Any) -> tuple[str, ...]:
     return tuple(map(str, cast("list[Any]", plain))) if isinstance(plain, list) else ()
 
 
-def _layout(features: Sequence[_Feature], context: base.ImportContext) -> str:
+def _layout(features: Sequence[_Feature], context: base.ImportContext) -> Layout:
     """Return a layout for the values of features, in order, with their names and units."""
     found: list[Feature] = []
     for feature in features:
@@ -378,7 +378,7 @@ def _layout(features: Sequence[_Feature], context: base.ImportContext) -> str:
             context.report("note", text)
             names = []
         found += base.features_of(key, size, names=names, units=_flat_names(feature.units))
-    return base.as_json(found)
+    return Layout(tuple(found))
 
 
 def _batches(
@@ -428,7 +428,7 @@ FORMAT: Final = base.Format(
     read=lambda folder, context: _Dataset(folder, context).read(),
     write=write,
     options=frozenset({"camera", "task", "images"}),
-    common=("actions", "states", "image_size", "control_hz"),
+    common=("action_layout", "state_layout", "image_size", "control_hz"),
     consecutive=True,
     timed=False,
 )

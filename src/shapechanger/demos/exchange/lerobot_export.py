@@ -168,7 +168,7 @@ class _Dataset:
         """Return the numbers of steps, the first one with a number, shape (n, k) each."""
         frames = np.arange(first, first + len(steps))[:, None]
         columns: _Columns = {_ACTION: _in_32_bits([step.action for step in steps])}
-        if layout := self._header.states:
+        if layout := self._header.state_layout:
             states = np.array([step.state for step in steps])
             middles = np.repeat([f.middle for f in layout], [f.size for f in layout])
             columns[_STATE] = _in_32_bits(np.where(np.isfinite(states), states, middles))
@@ -213,7 +213,8 @@ class _Dataset:
             key: {"dtype": str(values.dtype), "shape": [values.shape[1]], "names": None}
             for key, values in columns.items()
         }
-        for key, layout in ((_ACTION, self._header.actions), (_STATE, self._header.states)):
+        header = self._header
+        for key, layout in ((_ACTION, header.action_layout), (_STATE, header.state_layout)):
             if layout:  # The units are our own addition, which LeRobot ignores.
                 units = [feature.unit for feature in layout for _ in range(feature.size)]
                 found[key] |= {"names": value_names(layout), "units": units}

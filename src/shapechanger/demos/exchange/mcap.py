@@ -64,8 +64,8 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
 
 def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
     header, steps = episode.header, 0
-    layouts = {"state": header.states} if header.state_layout else {}
-    layouts |= dict.fromkeys(("action", "applied", "wanted"), header.actions)
+    layouts = {"state": header.state_layout} if header.state_layout else {}
+    layouts |= dict.fromkeys(("action", "applied", "wanted"), header.action_layout)
     schemas = {topic: _properties(layout) for topic, layout in layouts.items()}
     schemas |= {"reward": _REWARD, "step": _STEP}
     if header.image_size is not None:

@@ -36,7 +36,7 @@ from shapechanger.demos.exchange import base, files
 from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library
 from shapechanger.demos.jpeg import MAX_PIXELS, is_grey
 from shapechanger.errors import DemosError, translate_errors
-from shapechanger.layout import Feature
+from shapechanger.layout import Feature, Layout
 
 _DATA: Final = "data"
 _METADATA: Final = "metadata.json"
@@ -199,8 +199,8 @@ class _Dataset:
             context.report("note", base.UNKNOWN_RATE)
             hz = None
         self._header = EpisodeHeader(
-            action_layout=base.as_json(list(chain(*actions.values()))),
-            state_layout=base.as_json(list(chain(*states.values()))),
+            action_layout=Layout(tuple(chain(*actions.values()))),
+            state_layout=Layout(tuple(chain(*states.values()))),
             image_size=next(iter(images.values()), None),
             control_hz=hz or base.DEFAULT_HZ,
             clock="none",
@@ -353,7 +353,7 @@ def _write(
     storage = library(_STORAGE).MinariStorage.new(
         (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
         observation_space=space,
-        action_space=spaces.Box(header.actions.low, header.actions.high, dtype=np.float64),
+        action_space=_box(header.action_layout),
         data_format="hdf5",
     )
     total, drivers = 0, set[str]()
@@ -391,6 +391,10 @@ def _write(
     return total
 
 
+def _box(layout: Layout) -> spaces.Box:
+    return spaces.Box(layout.low, layout.high, dtype=np.float64)
+
+
 def _space_of(episode: base.ExchangeEpisode, grey: bool) -> spaces.Space[Any]:
     """Return the space of all observations."""
     header, found = episode.header, dict[str, spaces.Space[Any]]()
@@ -402,7 +406,7 @@ def _space_of(episode: base.ExchangeEpisode, grey: bool) -> spaces.Space[Any]:
         shape = (height, width) if grey else (height, width, 3)
         found["image"] = spaces.Box(0, 255, shape, np.uint8)
     if header.state_layout:
-        found["state"] = spaces.Box(header.states.low, header.states.high, dtype=np.float64)
+        found["state"] = _box(header.state_layout)
     if not found:
         raise DemosError(f"{episode.name} has neither images nor a state: export it to csv.")
     return spaces.Dict(found) if len(found) > 1 else next(iter(found.values()))
@@ -445,14 +449,14 @@ def _write_episode(group: Any, episode: base.ExchangeEpisode, grey: bool) -> lis
     last = steps[-1]
     cut = [*(step.truncated for step in steps[:-1]), last.truncated or not last.terminated]
     rewards = [math.nan if step.reward is None else step.reward for step in steps]
-    column(_ACTION, np.float64, [step.action for step in steps], (header.actions.size,))
+    column(_ACTION, np.float64, [step.action for step in steps], (header.action_layout.size,))
     column(_REWARD, np.float64, rewards)
     column(_TERMINATED, np.bool_, [step.terminated for step in steps])
     column(_TRUNCATED, np.bool_, cut)
     column(_STEP, h5py.string_dtype("utf-8"), rests)
     if header.state_layout:
         states = [step.state for step in (*steps, last)]
-        column(state_at, np.float64, states, (header.states.size,))
+        column(state_at, np.float64, states, (header.state_layout.size,))
     if images is not None:
         images.resize(len(images) + 1, axis=0)
         images[-1] = images[-2]
@@ -468,6 +472,6 @@ FORMAT: Final = base.Format(
     read=lambda folder, context: _Dataset(folder, context).read(),
     write=_write,
     options=frozenset({"hz", "dropped"}),
-    common=("actions", "states", "image_size", "control_hz"),
+    common=("action_layout", "state_layout", "image_size", "control_hz"),
     consecutive=True,
 )

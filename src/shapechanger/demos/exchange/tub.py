@@ -205,10 +205,8 @@ def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEp
     sessions = {number: str(fields.get("_session_id", "")) for number, fields in kept.items()}
     parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
     header = EpisodeHeader(
-        action_layout=_ACTIONS.to_json(),
-        state_layout=base.as_json(
-            [feature for name in sensed for feature in base.features_of(name, 1)]
-        ),
+        action_layout=_ACTIONS,
+        state_layout=Layout(tuple(base.features_of(name, 1)[0] for name in sensed)),
         body="car",
         source="tub",
     )
@@ -286,7 +284,7 @@ def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.Expor
     Actions of people, experts and programs are written as `user/...`, those of policies as
     `pilot/...`.
     """
-    action, states = episodes[0].header.actions, episodes[0].header.states
+    action, states = episodes[0].header.action_layout, episodes[0].header.state_layout
     if action.names != _ACTIONS.names or states.size != len(states):
         text = f"a tub has the action {', '.join(_ACTIONS.names)}, and a state of single numbers"
         raise DemosError(f"{episodes[0].name} does not fit: {text}; export it to minari or csv.")
@@ -377,5 +375,5 @@ FORMAT: Final = base.Format(
     read=_read,
     write=_write,
     options=frozenset({"camera", "hz"}),
-    common=("actions", "states"),
+    common=("action_layout", "state_layout"),
 )

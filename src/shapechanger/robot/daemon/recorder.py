@@ -33,7 +33,11 @@ _MAX_BYTES: Final = 16 << 20  # Bytes of queued frames.
 _CLOSE_S: Final = 5.0
 
 # Fields of the card that are copied to the header of an episode.
-_SHARED: Final = tuple(f.name for f in fields(EpisodeHeader) if hasattr(RobotCard, f.name))
+_SHARED: Final = tuple(
+    field.name
+    for field in fields(EpisodeHeader)
+    if hasattr(RobotCard, field.name) and not field.name.endswith("_layout")
+)
 
 _T = TypeVar("_T")
 
@@ -202,8 +206,11 @@ class Recorder:
         if self.on:
             begun = self.state().episode or "it starts now"
             raise Declined(f"An episode is being recorded already: {begun}.")
+        card = self._plan.card
         header = EpisodeHeader(
-            **{name: getattr(self._plan.card, name) for name in _SHARED},
+            **{name: getattr(card, name) for name in _SHARED},
+            action_layout=Layout.from_json(card.action_layout),
+            state_layout=Layout.from_json(card.state_layout),
             driver=driver or client.name,
             source="shapechanger robot",
             notes={"name": name, "recorded_by": client.name},

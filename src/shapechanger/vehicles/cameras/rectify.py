@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import DemosError, MissingExtra, WorldError
-from shapechanger.layout import Layout
 
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import EpisodeHeader
@@ -146,7 +145,7 @@ class CanonicalView:
                 f"These demonstrations are of several bodies, {', '.join(sorted(self._bodies))}, "
                 "which turn differently: learn from one at a time."
             )
-        if Layout.from_json(header.action_layout).names[0].startswith("waypoint/"):
+        if header.action_layout.names[0].startswith("waypoint/"):
             return picture
         camera, pitch, fovy = self._camera, header.camera_pitch_deg, header.camera_fovy_deg
         if camera is None:
