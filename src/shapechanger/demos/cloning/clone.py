@@ -80,7 +80,6 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         held_out: Share of the steps, in [0, 1), in one stretch, that is used for early stopping
             instead of training.
         checks: Number of validations during training.
-        patience: Number of validations without improvement after which training stops.
         rehearsal: Share of each batch that comes from the rehearsal data, if there are any.
         augmentation: Random changes of the images.
         eyes: Input of the first layer: "colours", or "edges": strength of the edges of each
@@ -108,7 +107,6 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
     weight_decay: float = 1e-3
     held_out: float = 0.1
     checks: int = 10
-    patience: int = 10
     rehearsal: float = 0.25
     augmentation: Augmentation = Augmentation()
     eyes: Literal["colours", "edges"] = "colours"
@@ -119,7 +117,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
     averaging: float = 0.0
 
     def __post_init__(self) -> None:
-        counts = "channels features batch fewest_steps checks patience nerves members"
+        counts = "channels features batch fewest_steps checks nerves members"
         shares = "held_out rehearsal dropout smoothing averaging"
         _require(self, counts, "at least 1", lambda x: x >= 1)
         _require(self, "most_steps", "at least fewest_steps", lambda x: x >= self.fewest_steps)
@@ -147,7 +145,6 @@ DEMOS: Final = CloneSettings(
     weight_decay=0.1,
     held_out=0.15,
     checks=12,
-    patience=12,
     augmentation=Augmentation(shift=3),
     eyes="edges",
     members=4,

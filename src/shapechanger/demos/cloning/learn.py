@@ -290,7 +290,7 @@ def _fit(
     # The network to validate and keep: the trained one, or a copy with averaged weights.
     kept = copy.deepcopy(network) if settings.averaging else network
     losses: list[float] = []
-    best_step, least, worse = -1, math.nan, 0
+    best_step, least = -1, math.nan
     best_weights = dict[str, Tensor]()
     for step in range(total + 1):
         if step % every == 0 or step == total:
@@ -300,12 +300,11 @@ def _fit(
             loss = sum(losses) / len(losses) if losses else math.nan
             report(MemberCheck(member, step, loss, error))
             losses.clear()
-            worse += 1
             # NaN without held-out data: keep the last.
             if best_step < 0 or not error >= least:
-                best_step, least, worse = step, error, 0
+                best_step, least = step, error
                 best_weights = {n: w.clone() for n, w in kept.state_dict().items()}
-            if step == total or worse >= settings.patience:
+            if step == total:
                 break
         for group in optimizer.param_groups:
             # A linear warm-up, and half a cosine down to 0.

@@ -300,19 +300,15 @@ class Step(
         return _converted(known, cls, strict=False)
 
 
-def _mapped(change: Callable[[Any], Any], fields: dict[str, Any]) -> dict[str, Any]:
-    """Change each value, and each one of the lists and dictionaries among them."""
-    changed: dict[str, Any] = {}
-    for name, value in fields.items():
-        match value:
-            case dict():
-                items = cast("dict[str, Any]", value).items()
-                changed[name] = {key: change(one) for key, one in items}
-            case list() | tuple():
-                changed[name] = [change(one) for one in cast("Sequence[Any]", value)]
-            case _:
-                changed[name] = change(value)
-    return changed
+def _mapped(change: Callable[[Any], Any], value: Any) -> Any:
+    """Return JSON with each value changed that is neither a list nor an object."""
+    match value:
+        case dict():
+            return {k: _mapped(change, v) for k, v in cast("dict[str, Any]", value).items()}
+        case list() | tuple():
+            return [_mapped(change, each) for each in cast("Sequence[Any]", value)]
+        case _:
+            return change(value)
 
 
 def _converted(fields: Any, kind: Any, *, strict: bool = True) -> Any:
