@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import os
 import shutil
 import socket
-import sys
 import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +36,6 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.start import BoardAt, Place, find_board, start_board
 
 _HERE: Final = "127.0.0.1"
-_LOOK_EVERY_S: Final = 0.1
 _EVERYWHERE: Final = "0.0.0.0"
 _PILOT: Final = "shapechanger.vehicles.remote.pilot"
 # A twin's clock is paused while it renders, and a guard that waits for it is alive.
@@ -116,13 +111,12 @@ class Service:
         """Return the plan for the robot's processes; `board` is the twin's, None on hardware."""
         name, guard, camera = profile.name, profile.guard_plan(), profile.camera
         folder = self.credentials or credentials_folder(name)
-        ready_file, policy = self.ready_file, self.policy
+        policy = self.policy
         if board is None:
             credentials = load_credentials(folder)
         else:
             credentials = make_credentials(folder, name)
             camera = camera and board.camera_plan(camera)
-            ready_file = ready_file or board.folder / f"ready-{os.getpid()}.json"
         is_open = self.arm_by_program or board is not None
         is_local = self.insecure or board is not None
         policies = policy if policy is None or policy.is_dir() else policy.parent
@@ -140,7 +134,7 @@ class Service:
             key_file=str(credentials.key_file),
             insecure=self.insecure,
             discovery=self.announce,
-            ready_file=_absolute(ready_file),
+            ready_file=_absolute(self.ready_file),
             recordings=_absolute(self.recordings or recordings_folder(name)),
             policies=_absolute(policies),
             policy="" if policy is None or policy == policies else policy.stem,
@@ -152,54 +146,22 @@ class Service:
         patience_ms = _TWIN_PATIENCE_MS if self.clock == "twin" else 0
         return ServePlan(guard, fields, board.hardware, patience_ms=patience_ms)
 
-    def make_known(
-        self, name: str, plan: ServePlan, port: int, say: Callable[[str], object]
-    ) -> None:
-        """Let another process store the twin's address for this machine once it can be reached.
+    def make_known(self, name: str, plan: ServePlan, port: int) -> str:
+        """Store the twin's address for this machine, and return a message about it; "" if not.
 
-        This process becomes the supervisor. A robot that does not start must not take the name from
-        one that runs.
+        Without TLS, or with its own credentials and any free port, the caller passes it on.
         """
-        # Without TLS, or with its own credentials and any free port, the caller passes the
-        # address on.
         if self.insecure or (self.credentials is not None and not self.port):
-            return
+            return ""
         credentials = load_credentials(self.credentials or credentials_folder(name))
-        try:
-            robot = robot_at(str(address_here(self.host, port)), name, credentials)
-        except LinkError:  # Not every name of a robot is a valid name of a file.
-            return
         plan.daemon["port"] = port  # A daemon that is started again keeps it.
-        sys.stdout.flush()
-        served_by = os.getpid()
-        if child := os.fork():
-            os.waitpid(child, 0)
-            return
-        try:
-            # A child of init, because the supervisor may only have the children that it started.
-            if not os.fork() and _is_reached(Path(plan.daemon["ready_file"]), port, served_by):
-                say(store(robot))
-        finally:
-            sys.stdout.flush()
-            os._exit(0)
+        with contextlib.suppress(LinkError):  # Not every name of a robot is one of a file.
+            return store(robot_at(str(address_here(self.host, port)), name, credentials))
+        return ""
 
 
 def _absolute(path: Path | None) -> str:
     return "" if path is None else str(path.absolute())
-
-
-def _is_reached(ready_file: Path, port: int, served_by: int) -> bool:
-    """Wait until a robot can be reached at a port, or until its supervisor has ended."""
-    os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # The twin ends when the last file is closed.
-    while True:
-        with contextlib.suppress(OSError, ValueError, LookupError, TypeError):
-            if json.loads(ready_file.read_text())["port"] == port:
-                return True
-        try:
-            os.kill(served_by, 0)
-        except ProcessLookupError:
-            return False
-        time.sleep(_LOOK_EVERY_S)
 
 
 def require_free(host: str, port: int) -> int:

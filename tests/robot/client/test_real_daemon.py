@@ -17,6 +17,7 @@ from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import load_credentials, make_credentials
+from shapechanger.robot.link.messages import Judge, Recordings
 from tests.robot.client.robot import STATE, eventually
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Running, running
@@ -142,7 +143,8 @@ def test_a_person_records_marks_and_undoes(recorder: Served, tmp_path: Path) -> 
         assert client.recorder == ended
         (summary,) = client.browse().episodes
         assert (summary.id, summary.steps, summary.kept) == (ended.episode, 8, 2)
-        assert client.judge(summary.id, 0, 5, keep=True).kept == 8
+        judge = Judge(episode=summary.id, first=0, last=5, keep=True)
+        assert client._ask(judge, Recordings).episodes[0].kept == 8
         piece = client.fetch(summary.id)
         path = tmp_path / "kept" / summary.id
         assert "".join(f"{line}\n" for line in piece.lines) == (path / "steps.jsonl").read_text()

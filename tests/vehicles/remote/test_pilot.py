@@ -17,6 +17,7 @@ from shapechanger.errors import PolicyError, RobotRefused
 from shapechanger.policy import PolicyCard
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.link.card import RobotCard, card_of
+from shapechanger.robot.link.messages import PolicyState, RunPolicy
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
@@ -125,6 +126,10 @@ def _moves(person: RobotClient) -> bool:
     return any(person.ask().message.action_applied)
 
 
+def _policies(person: RobotClient) -> PolicyState:
+    return person.answer(PolicyState)
+
+
 @pytest.mark.gl
 @pytest.mark.system
 @pytest.mark.realtime
@@ -140,11 +145,11 @@ def test_a_policy_drives_on_board(student: Path) -> None:
         seen = person.ask().message
         person.command([0.0] * 2, answers=seen.seq)
         until(lambda: person.ask().message.suggested_by == "student")
-        person.run_policy("")
-        until(lambda: person.policies is not None and person.policies.running == "")
-        assert person.policies.names == ("student",)
+        person._post(RunPolicy(policy=""))
+        until(lambda: _policies(person).running == "")
+        assert _policies(person).names == ("student",)
         person.release()
-        person.run_policy("student")
+        person._post(RunPolicy(policy="student"))
         until(lambda: person.ask().message.holder == "student")
         # Nothing moves before a person arms the robot again.
         assert not person.ask().message.armed
@@ -163,8 +168,9 @@ def test_a_policy_that_dies_or_hangs_stops_the_robot(student: Path, number: int)
         until(lambda: not _moves(person))
         if number == signal.SIGKILL:
             until(lambda: person.ask().message.holder == "")
-            assert person.policies is not None
-            until(lambda: person.policies.text == "student ended: its process ended with code -9.")
+            until(
+                lambda: _policies(person).text == "student ended: its process ended with code -9."
+            )
         else:
             os.kill(pid, signal.SIGCONT)
 
@@ -179,8 +185,7 @@ def test_a_policy_of_nan_moves_nothing(tmp_path: Path) -> None:
     file = tmp_path / "nan.onnx"
     policy.export(file)
     with _served(file, "twin") as (_, person):
-        until(lambda: person.policies is not None and person.policies.running == "")
-        assert person.policies is not None
-        assert "The policy gave [nan, nan], which is not finite." in person.policies.text
+        until(lambda: _policies(person).running == "")
+        assert "The policy gave [nan, nan], which is not finite." in _policies(person).text
         until(lambda: person.ask().message.holder == "")
         assert not _moves(person)

@@ -71,7 +71,8 @@ class RobotServe(Service):
             with contextlib.suppress(OSError):  # A full disk loses messages, not the robot.
                 if board is not None:
                     say(f"twin of {profile.name}: ledger {board.ledger_path}")
-                    self.make_known(profile.name, plan, port, say)
+                    if known := self.make_known(profile.name, plan, port):
+                        say(known)
                 sys.stdout.flush()
             # Replaces this process, which has loaded much that a supervisor does not need.
             command = [*command_of("supervise", plan), "--plan-fd", str(plan_fd(plan))]

@@ -155,28 +155,19 @@ class RobotClient(Inbox):
         reason = newest.message.stop_reason
         raise RobotRefused(f"The robot did not arm{f': {reason}' if reason else ''}.")
 
-    def command(
-        self,
-        values: Sequence[float],
-        *,
-        answers: int,
-        ttl_ms: int | None = None,
-        scale: float = 1.0,
-    ) -> int:
-        """Send a command, which is in force until the next one or until it expires.
+    def command(self, values: Sequence[float], *, answers: int, scale: float = 1.0) -> int:
+        """Send a command, in force until the next one or until the robot's deadline.
 
         Args:
             values: One number for each action of the robot, in the order of its action layout.
             answers: `seq` of the observation that the command answers.
-            ttl_ms: Lifetime, ms; None for the robot's deadline.
             scale: Cap, 0 to 1, by which the values are multiplied.
 
         Returns:
             The number of the command.
         """
         seq = next(self._numbers)
-        ttl_ms = self.welcome.deadline_ms if ttl_ms is None else ttl_ms
-        floats = tuple(map(float, values))
+        floats, ttl_ms = tuple(map(float, values)), self.welcome.deadline_ms
         self._post(
             messages.Command(seq=seq, answers=answers, values=floats, ttl_ms=ttl_ms, scale=scale)
         )
@@ -264,18 +255,6 @@ class RobotClient(Inbox):
         undo = messages.Undo(seconds=seconds)
         return self._ask(undo, messages.RecorderState, lambda state: state.dropped > before)
 
-    def run_policy(self, name: str) -> messages.PolicyState:
-        """Start a policy on board instead of the running one; only as a person.
-
-        Args:
-            name: Name of the policy; "" to end the one that runs.
-
-        Raises:
-            RobotRefused: If there is no such policy on board, or it runs already.
-        """
-        request = messages.RunPolicy(policy=name)
-        return self._ask(request, messages.PolicyState, lambda state: state.running == name)
-
     def browse(self, before: str = "") -> messages.Recordings:
         """List the episodes on the robot, newest first.
 
@@ -297,24 +276,6 @@ class RobotClient(Inbox):
         """
         request = messages.Fetch(episode=episode, first=first, count=count)
         return self._ask(request, messages.Piece)
-
-    def judge(self, episode: str, first: int, last: int, *, keep: bool) -> messages.EpisodeSummary:
-        """Keep or drop steps of an episode; only as a person.
-
-        Args:
-            episode: Id of the episode.
-            first: Number of the first step.
-            last: Number of the last step, inclusive.
-            keep: Whether to use the steps for training.
-
-        Returns:
-            The episode after the change.
-
-        Raises:
-            RobotRefused: If there are no such steps, or the episode is being recorded.
-        """
-        request = messages.Judge(episode=episode, first=first, last=last, keep=keep)
-        return self._ask(request, messages.Recordings).episodes[0]
 
     def ping(self) -> tuple[float, int]:
         """Measure the round trip.

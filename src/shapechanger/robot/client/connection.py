@@ -181,11 +181,6 @@ class Inbox:
         """Last reported state of the robot's recorder; None before the first."""
         return self.said(messages.RecorderState)
 
-    @property
-    def policies(self) -> messages.PolicyState | None:
-        """Last report of the policies on board; None before the first."""
-        return self.said(messages.PolicyState)
-
     def put(self, message: messages.RobotMessage) -> None:
         """Store a message that has just arrived."""
         with self._changed:
