@@ -280,7 +280,7 @@ class Robot:
         if self.image_size is not None and hello.frames and frame_sent != self._frame_seq:
             frame = self.jpeg or picture(self.image_size, self._frame_seq)
         acts = command is not None and self.armed and not self.refusal
-        return m.Observation(
+        return observation(
             seq=self._seq,
             captured_ns=now_ns - (10**15 if self.frozen else 0),
             state_ns=now_ns,
@@ -294,9 +294,8 @@ class Robot:
                 if f.element and f.name not in self.absent
             },
             action_applied=self._values,
-            applied_seq=command.seq if acts and command else None,
-            applied_ns=now_ns if acts else None,
-            command_ns=now_ns if acts else None,
+            **({"applied_seq": command.seq} if acts and command else {}),
+            **dict.fromkeys(("applied_ns", "command_ns"), now_ns if acts else None),
             stop_reason=self.stop_reason,
             armed=self.armed,
             emergency=self.emergency,

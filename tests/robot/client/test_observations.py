@@ -4,11 +4,9 @@ import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from shapechanger.layout import Layout
 from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.observations import RobotSpaces, resize_picture
-from shapechanger.robot.link.messages import Welcome
-from tests.robot.client.robot import observation, picture
+from tests.robot.client.robot import Robot, observation, picture
 
 sides = st.integers(1, 12)
 
@@ -34,22 +32,7 @@ def test_shrinking_by_a_whole_number_keeps_the_mean(
 
 def spaces() -> RobotSpaces:
     """Return the spaces of a robot with a camera and no sensors."""
-    layout = Layout(()).to_json()
-    welcome = Welcome(
-        robot="tin",
-        body="car",
-        action_layout=layout,
-        state_layout=layout,
-        image_size=(16, 12),
-        control_hz=20.0,
-        deadline_ms=250,
-        max_observation_age_ms=400,
-        reward={},
-        reset=(),
-        arming="anyone",
-        clock="real",
-        session=1,
-    )
+    welcome = Robot(actions=(), state=(), image_size=(16, 12))._welcome()
     return RobotSpaces(welcome, (16, 12), image=True, state=False)
 
 

@@ -8,6 +8,7 @@ from typing import Any, Final, Self
 import msgspec
 from playwright.sync_api import Browser, Page, TimeoutError
 
+from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.twin.ledger import Transition
 from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.twin.robots import until
@@ -23,6 +24,9 @@ PHONE_ON_ITS_SIDE: Final[dict[str, Any]] = PHONE | {"viewport": {"width": 844, "
 # Pins of the drive of `CAR`, forward and backward.
 _DRIVE: Final = (22, 27)
 
+_DEADLINE_MS: Final = 250.0
+# Delay of the guard, ms: one of its ticks, and the one-shot of the enable line.
+_SLACK_MS: Final = 60.0
 _PRESSES: Final = 6
 _PRESSED_S: Final = 10.0
 # Errors that Chromium logs for failures that a test provokes.
@@ -190,6 +194,18 @@ class Pins:
     def await_rest(self) -> None:
         until(lambda: self.propels() == 0.0, 60.0)
         self.forget()
+
+    def await_deadline(self, observer: RobotClient) -> None:
+        """Wait for rest, and check that it comes within the deadline after the last command."""
+        commands = [observer.ask().message.command_ns or 0]
+
+        def rests() -> bool:
+            commands.append(observer.ask().message.command_ns or 0)
+            return self.propels() == 0.0
+
+        until(rests, 60.0)
+        assert max(commands) > 0
+        assert (self.rest_ns - max(commands)) / 1e6 <= _DEADLINE_MS + _SLACK_MS
 
     def _push(self) -> float:
         forward, backward = self._duties.values()

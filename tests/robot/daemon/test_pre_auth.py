@@ -4,6 +4,7 @@ import asyncio
 from collections import Counter
 from dataclasses import dataclass
 from functools import partial
+from unittest.mock import MagicMock
 
 import pytest
 from hypothesis import given
@@ -14,7 +15,7 @@ from shapechanger.robot.daemon.server import Listener
 pytestmark = pytest.mark.realtime
 
 
-_listener = partial(Listener, asyncio.Protocol, None)
+_listener = partial(Listener, MagicMock, None)
 
 
 @dataclass(eq=False)

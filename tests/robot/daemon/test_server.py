@@ -18,7 +18,6 @@ from shapechanger.robot.link.messages import (
     EmergencyStop,
     Event,
     Hello,
-    Lease,
     Refused,
     Release,
 )
@@ -89,22 +88,6 @@ async def test_connections_are_limited_before_authentication(robot: Running) -> 
         await clients[0].expect(Challenge)
         assert await clients[0].receive() is None  # Displaced by the 17th connection.
         await clients[1].greet()
-
-
-async def test_a_second_program_waits_and_a_person_does_not(robot: Running) -> None:
-    async with (
-        robot.client(name="sac") as sac,
-        robot.client(name="ppo") as ppo,
-        robot.client(name="Ann", role="person") as ann,
-    ):
-        assert await sac.take() == Lease(mine=True, holder="sac", reason="sac has control.")
-        lease = await ppo.take()
-        assert (lease.mine, lease.holder) == (False, "sac")
-        await robot.armed(ann)
-        lost = await sac.expect(Lease)
-        assert (lost.mine, lost.holder) == (False, "Ann")
-        assert "took control from sac" in lost.reason
-        assert (await ann.drive(1, 0.0, 0.5)).action_applied == (0.0, 0.5)
 
 
 @pytest.mark.parametrize("how", ["release", "close", "abort"])

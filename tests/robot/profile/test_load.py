@@ -1,7 +1,6 @@
 """Finding, reading, writing and changing profile files."""
 
 import datetime
-import os
 import stat
 from pathlib import Path
 
@@ -194,16 +193,3 @@ def test_a_first_profile_takes_another_camera(kind: str, camera: str, tmp_path: 
         assert (profile.camera.size, profile.camera.fps) == (before.camera.size, before.camera.fps)
     assert profile.outputs == before.outputs
     assert "# " in profile.path.read_text()
-
-
-@pytest.mark.parametrize("step", ["os.fsync", "pathlib.Path.chmod", "pathlib.Path.replace"])
-def test_a_full_disk_loses_nothing(step: str, rover: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-
-    def fails(*_: object) -> None:
-        raise OSError(28, os.strerror(28))
-
-    monkeypatch.setattr(step, fails)
-    with pytest.raises(OutputError, match=r"Cannot write .*rover\.toml: No space left on device"):
-        rewrite(rover, {"robot.name": "new"})
-    assert rover.read_text() == EVERYTHING
-    assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]

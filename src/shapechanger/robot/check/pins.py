@@ -31,7 +31,6 @@ def require_pins(plan: GuardPlan) -> None:
 
 
 def _pins_of(plan: GuardPlan) -> dict[int, str]:
-    """Return the robot's pins and their uses."""
     used: dict[int, str] = {}
     for device in (*plan.outputs, *plan.sensors):
         keys = [(SENSORS if isinstance(device, SensorPlan) else OUTPUTS)[device.driver].keys]

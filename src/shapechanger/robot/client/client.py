@@ -364,7 +364,6 @@ class RobotClient(Inbox):
             self.fail(LinkError("The connection was closed: make a new one."))
 
     async def _exchange(self) -> None:
-        """Connect, receive and send until `_stop` is set."""
         self._loop = asyncio.get_running_loop()
         async with connection.open_connection(*self._settings) as (websocket, welcome):
             self.put(welcome)

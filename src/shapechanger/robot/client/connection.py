@@ -24,7 +24,7 @@ from shapechanger.errors import (
 )
 from shapechanger.robot.client.known_robots import KnownRobot, parse_trust
 from shapechanger.robot.link import messages
-from shapechanger.robot.link.address import Address, parse_address
+from shapechanger.robot.link.address import parse_address
 from shapechanger.robot.link.authentication import make_proof, parse_key
 
 with translate_errors(ImportError, to=lambda _: MissingExtra("aiohttp", "remote")):
@@ -80,9 +80,19 @@ async def open_connection(
             yield websocket, welcome
     except LinkError:
         raise
+    except aiohttp.ServerFingerprintMismatch as error:
+        raise RobotRefused(
+            f"{address} shows the fingerprint\n  {error.got.hex()}\nand not\n"
+            f"  {error.expected.hex()}\nEither the robot was set up again, or the connection is "
+            "intercepted. Compare it with the one that `shapechanger robot key NAME` shows on the "
+            "robot before you trust it."
+        ) from None
     except (aiohttp.ClientError, OSError) as error:  # TimeoutError is an OSError.
         # Callers see one error of ours, without a chain of library errors.
-        raise _explained(error, address, timeout_s) from None
+        raise LinkError(
+            f"No robot answers at {address} within {timeout_s:.1f} s ({error!r}). Is it on, in "
+            "this network, and does `shapechanger robot serve` run on it?"
+        ) from None
     finally:
         # Skip the closing handshake of TLS, which a dead connection never answers.
         for each in sockets:
@@ -117,30 +127,12 @@ def lost(why: str) -> LinkError:
 
 
 async def _expect(websocket: aiohttp.ClientWebSocketResponse, kind: type[_M]) -> _M:
-    """Receive a message of one type."""
     message = await receive(websocket)
     if isinstance(message, messages.Refused):
         raise RobotRefused(message.reason)
     if not isinstance(message, kind):
         raise LinkError(f"Expected a {kind.__name__} from the robot, got {type(message).__name__}.")
     return message
-
-
-def _explained(error: Exception, address: Address, timeout_s: float) -> LinkError:
-    """Return our error for a failure to connect."""
-    match error:
-        case aiohttp.ServerFingerprintMismatch():
-            return RobotRefused(
-                f"{address} shows the fingerprint\n  {error.got.hex()}\nand not\n"
-                f"  {error.expected.hex()}\nEither the robot was set up again, or the "
-                "connection is intercepted. Compare it with the one that `shapechanger robot key "
-                "NAME` shows on the robot before you trust it."
-            )
-        case _:
-            return LinkError(
-                f"No robot answers at {address} within {timeout_s:.1f} s ({error!r}). Is it on, in "
-                "this network, and does `shapechanger robot serve` run on it?"
-            )
 
 
 @dataclass(frozen=True, slots=True)

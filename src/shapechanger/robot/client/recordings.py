@@ -206,7 +206,6 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
 
 
 def _require_fit(episode: Episode, welcome: Welcome) -> None:
-    """Refuse a robot that does not fit the recording."""
     recorded = episode.header.action_layout
     moved = Layout.from_json(welcome.action_layout)
     layouts = recorded, moved

@@ -305,7 +305,6 @@ class SessionHub:
             client.post(messages.Lease(mine=mine, holder=self.holder_name, reason=reason))
 
     def _drop_suggestion(self, client: Client) -> None:
-        """Drop the suggestion of a client that left or took the lease."""
         if self._suggestion.client is client:
             self._suggestion = _NOTHING
 

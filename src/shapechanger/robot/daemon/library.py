@@ -110,7 +110,6 @@ class RecordingLibrary:
         return path
 
     def _piece(self, path: Path, question: messages.Fetch) -> messages.Piece:
-        """Read a part of an episode."""
         steps = path / STEPS
         if self._index.path != steps:
             self._index = LineIndex(steps)

@@ -99,7 +99,6 @@ class PolicyRunner:
         await _cancel(self._task)
 
     async def _supervise(self, before: asyncio.Task[None] | None, name: str) -> None:
-        """Run a policy's process, and report its messages."""
         await _cancel(before)
         if not name:
             self._report("", "")

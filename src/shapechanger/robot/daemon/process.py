@@ -248,7 +248,6 @@ class Daemon:
         return FrameReader(plan, checks, deliver, report)
 
     def _report_ready(self, port: int, fingerprint: bytes) -> None:
-        """Report the port in the log, and in the ready file if there is one."""
         plan = self._hub.plan
         secured = f"fingerprint {fingerprint_short(fingerprint)}" if fingerprint else "without TLS"
         _log.info("%s listens at %s, %s.", plan.card.robot, Address(plan.host, port), secured)

@@ -44,7 +44,7 @@ class Listener:
 
     def __init__(
         self,
-        protocol: Callable[[], asyncio.Protocol],
+        protocol: Callable[[], web.RequestHandler],
         tls: ssl.SSLContext | None,
         max_total: int = _MAX_TOTAL,
         max_per_address: int = _MAX_PER_ADDRESS,
@@ -154,36 +154,30 @@ class AcceptedSocket:
         self,
         accepted: socket.socket,
         address: str,
-        protocol: asyncio.Protocol,
+        protocol: web.RequestHandler,
         tls: ssl.SSLContext | None,
     ) -> None:
         self.address = address
-        self._socket = accepted
-        self._transport: asyncio.Transport | None = None
-        self._task = asyncio.create_task(self._connect(protocol, tls))
+        self._socket, self._protocol = accepted, protocol
+        self._task = asyncio.create_task(self._connect(tls))
 
     @property
     def is_gone(self) -> bool:
         """True once the connection has closed by itself."""
-        return self._task.done() and (self._transport is None or self._transport.is_closing())
+        return self._socket.fileno() < 0
 
     def drop(self) -> None:
         """Close the connection without a message."""
-        if self._transport is not None:
-            self._transport.abort()
+        if self._protocol.transport is not None:
+            self._protocol.transport.abort()
             return
-        # The handshake then reads the end of the stream at any stage.
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError):  # The handshake reads the end of the stream.
             self._socket.shutdown(socket.SHUT_RDWR)
 
-    async def _connect(self, protocol: asyncio.Protocol, tls: ssl.SSLContext | None) -> None:
+    async def _connect(self, tls: ssl.SSLContext | None) -> None:
         loop = asyncio.get_running_loop()
-        try:
-            self._transport, _ = await loop.connect_accepted_socket(
-                lambda: protocol, self._socket, ssl=tls
-            )
-        except OSError as error:  # The other end does not use TLS, or has disconnected.
-            _log.debug("The TLS handshake with %s failed: %s", self.address, error)
+        with contextlib.suppress(OSError):  # The other end does not use TLS, or has disconnected.
+            await loop.connect_accepted_socket(lambda: self._protocol, self._socket, ssl=tls)
 
 
 _SHUTDOWN_S: Final = 0.2  # Short, because no messages remain to be sent.
@@ -260,7 +254,7 @@ class Server:
         app.router.add_get("/link", self._link)
         return app
 
-    def _protocol(self) -> asyncio.Protocol:
+    def _protocol(self) -> web.RequestHandler:
         server = self._runner.server
         if server is None:
             raise RobotError("The server has not started.")

@@ -220,7 +220,6 @@ class Session:
         return observation
 
     def _count(self) -> None:
-        """Count a message, and refuse it above the rate."""
         now_s = monotonic()
         gained = (now_s - self._counted_s) * self._messages_per_s
         self._tokens = min(self._messages_per_s, self._tokens + gained)
@@ -331,7 +330,6 @@ class Session:
         return self._socket
 
     async def _greet(self) -> None:
-        """Authenticate the client."""
         await self._send(
             messages.Challenge(
                 version=messages.VERSION, nonce=self._nonce, robot=self._hub.plan.card.robot
@@ -346,7 +344,6 @@ class Session:
         await self._send(self.introduce(data))
 
     async def _exchange(self) -> None:
-        """Exchange messages until the client disconnects."""
         try:
             async with asyncio.TaskGroup() as group:
                 others = [group.create_task(work) for work in (self._answer(), self._observe())]
@@ -360,7 +357,6 @@ class Session:
         await self._in_time(self._socket.send_bytes(messages.encode(message)))
 
     async def _in_time(self, sending: Awaitable[None]) -> None:
-        """Wait for a message to be sent."""
         with (
             translate_errors(TimeoutError, to=lambda _: LinkError(NOT_READING)),
             translate_errors(ConnectionError, RuntimeError, to=_ended),

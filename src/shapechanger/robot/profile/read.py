@@ -323,12 +323,10 @@ def _check_stop(root: Table, profile: Profile) -> None:
 
 
 def _propelling(profile: Profile) -> set[str]:
-    """Return the names of the actions that propel the robot."""
     return {action.name for action in profile.actions if action.propels}
 
 
 def _drives(profile: Profile, output: OutputPlan) -> bool:
-    """Return whether an output can propel the robot."""
     return (
         OUTPUTS[output.driver].drives
         or output.part in get_args(DrivingPart)

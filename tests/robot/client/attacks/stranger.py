@@ -32,23 +32,19 @@ def proof(key: bytes, nonce: bytes, certificate: bytes, role: str) -> bytes:
     return hmac.digest(key, text, "sha256")
 
 
-def frame(
-    data: bytes, opcode: int = BINARY, *, end: bool = True, flags: int = 0, mask: bool = True
-) -> bytes:
-    return header(len(data), opcode, end=end, flags=flags, mask=mask) + data  # The mask is 0.
+def frame(data: bytes, opcode: int = BINARY, *, end: bool = True) -> bytes:
+    return header(len(data), opcode, end=end) + data  # The mask is 0.
 
 
-def header(
-    length: int, opcode: int = BINARY, *, end: bool = True, flags: int = 0, mask: bool = True
-) -> bytes:
-    """Return the header of a frame that claims `length` bytes."""
+def header(length: int, opcode: int = BINARY, *, end: bool = True) -> bytes:
+    """Return the header of a masked frame that claims `length` bytes."""
     if length < 126:
-        size = bytes([length | mask << 7])
+        size = bytes([length | 128])
     elif length < 2**16:
-        size = struct.pack(">BH", 126 | mask << 7, length)
+        size = struct.pack(">BH", 126 | 128, length)
     else:
-        size = struct.pack(">BQ", 127 | mask << 7, length)
-    return bytes([end << 7 | flags | opcode]) + size + bytes(4 * mask)
+        size = struct.pack(">BQ", 127 | 128, length)
+    return bytes([end << 7 | opcode]) + size + bytes(4)
 
 
 class Stranger:
@@ -94,9 +90,6 @@ class Stranger:
 
     def __exit__(self, *_: object) -> None:
         """Close the connection without a word."""
-        self.close()
-
-    def close(self) -> None:
         self._socket.close()
 
     # Bytes.

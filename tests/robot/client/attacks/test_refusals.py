@@ -1,14 +1,12 @@
 """Attacks that a served robot refuses without a movement, each by its name."""
 
-import math
 import ssl
 from collections.abc import Callable
 from typing import Any, Final
 
-import msgspec.msgpack
 import pytest
 
-from tests.robot.client.attacks.scene import FULL, Scene, settle
+from tests.robot.client.attacks.scene import FULL, Scene
 from tests.robot.client.attacks.stranger import BINARY, TEXT, Stranger, frame, header, proof
 
 pytestmark = [pytest.mark.system, pytest.mark.realtime]
@@ -143,17 +141,9 @@ FRAMES: Final[dict[str, tuple[str, list[bytes]]]] = {
         "closed",
         [frame(bytes(1024), 0 if n else BINARY, end=False) for n in range(1024)],
     ),
+    "deep_nesting": ("Not a valid message", [frame(b"\x91" * 60_000)]),
     "text_message": ("binary messages", [frame(b'{"kind":"emergencystop"}', TEXT)]),
 }
-BODIES: Final = {
-    "array_that_claims_4_billion": b"\xdd\xff\xff\xff\xff",
-    "deep_nesting": b"\x91" * 60_000,
-    "invalid_utf_8": b"\x81\xa4kind\xa4\xff\xfe\xfd\xfc",
-    "message_of_a_robot": msgspec.msgpack.encode({"kind": "lease", "mine": True, "holder": "me"}),
-}
-
-
-FRAMES.update({name: ("Not a valid message", [frame(body)]) for name, body in BODIES.items()})
 ATTACKS.update(
     {
         name: (lambda scene, sent=sent: framed(scene, *sent), words)
@@ -200,56 +190,6 @@ def test_control_is_not_taken_from_a_person(scene: Scene, role: str) -> None:
     assert "cannot take it from a person" in lease["reason"]
     thief.drive(2**50, *FULL)
     assert "do not have control" in thief.refusal()
-
-
-# Within the operator's own session: what a recorder of its messages, or a bug, could send.
-
-
-def repeated(scene: Scene, **fields: object) -> str:
-    """Command full speed with some fields changed, after a command to rest; return the refusal."""
-    operator = scene.operator
-    operator.drive(5, 0.0, 0.0)
-    seen = operator.expect("observation")
-    operator.send("command", **({"seq": 6, "answers": seen["seq"], "values": FULL} | fields))
-    return operator.refusal()
-
-
-def too_late(scene: Scene, kind: str, **fields: object) -> str:
-    """Answer an observation so late that nobody knows what the robot sees."""
-    operator = scene.operator
-    if kind == "arm":
-        operator.send("disarm")
-    seen = operator.observe()
-    settle(scene.robot, scene.key, 450_000_000)
-    operator.send(kind, answers=seen["seq"], **fields)
-    return operator.refusal()
-
-
-ATTACKS |= {
-    "answer_to_an_old_observation": (
-        lambda scene: too_late(scene, "command", seq=7, values=FULL),
-        "ms are allowed",
-    ),
-    "late_request_to_arm": (lambda scene: too_late(scene, "arm"), "Not armed."),
-}
-
-
-UNUSABLE: Final[dict[str, tuple[dict[str, Any], str]]] = {
-    "replayed_command": ({"seq": 5}, "not newer than 5"),
-    "answer_to_the_future": ({"answers": 2**52}, "was not sent to this client"),
-    "answer_to_the_distant_past": ({"answers": 0}, "was not sent to this client"),
-    "not_a_number": ({"values": (0.0, math.nan)}, "must be finite"),
-    "too_few_values": ({"values": (1.0,)}, "has 2 values"),
-    "scaled_up": ({"scale": 2.0}, "Not a valid message"),
-}
-
-
-ATTACKS.update(
-    {
-        name: (lambda scene, fields=fields: repeated(scene, **fields), words)
-        for name, (fields, words) in UNUSABLE.items()
-    }
-)
 
 
 @pytest.mark.parametrize("name", ATTACKS)
