@@ -68,9 +68,7 @@ class EchoRobot:
             ),
             camera=CameraPlan("pipe", fps=_HZ, settings={"path": str(folder / "camera.mjpeg")}),
             port=0,
-            certificate=str(credentials.certificate),
-            private_key=str(credentials.private_key),
-            key_file=str(credentials.key_file),
+            credentials=str(credentials.folder),
             discovery=False,
             ready_file=str(folder / "ready.json"),
         )
@@ -91,8 +89,8 @@ class EchoRobot:
         while not ready.exists():
             time.sleep(0.01)
         port = int(ready.read_text().split('"port": ')[1].split(",")[0])
-        key = credentials.key_file.read_text().strip()
-        self._known = KnownRobot("echo", f"127.0.0.1:{port}", key, credentials.fingerprint.hex())
+        address, fingerprint = f"127.0.0.1:{port}", credentials.fingerprint.hex()
+        self._known = KnownRobot("echo", address, credentials.key, fingerprint)
 
     def __enter__(self) -> Self:
         """Return the robot."""

@@ -113,9 +113,9 @@ class Service:
         folder = self.credentials or credentials_folder(name)
         policy = self.policy
         if board is None:
-            credentials = load_credentials(folder)
+            load_credentials(folder)
         else:
-            credentials = make_credentials(folder, name)
+            make_credentials(folder, name)
             camera = camera and board.camera_plan(camera)
         is_open = self.arm_by_program or board is not None
         is_local = self.insecure or board is not None
@@ -129,9 +129,7 @@ class Service:
             camera=camera,
             host=self.host or (_HERE if is_local else _EVERYWHERE),
             port=self.port,
-            certificate="" if self.insecure else str(credentials.certificate),
-            private_key="" if self.insecure else str(credentials.private_key),
-            key_file=str(credentials.key_file),
+            credentials=_absolute(folder),
             insecure=self.insecure,
             discovery=self.announce,
             ready_file=_absolute(self.ready_file),
@@ -209,5 +207,4 @@ def store(robot: KnownRobot) -> str:
 
 def robot_at(address: str, name: str, credentials: Credentials) -> KnownRobot:
     """Return the address and credentials that clients use for a robot."""
-    key = credentials.key_file.read_text().strip()
-    return KnownRobot(name, address, key, credentials.fingerprint.hex())
+    return KnownRobot(name, address, credentials.key, credentials.fingerprint.hex())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ssl
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -161,9 +160,7 @@ class Robot:
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)
         await runner.setup()
         assert self._credentials is not None
-        tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        tls.load_cert_chain(self._credentials.certificate, self._credentials.private_key)
-        await web.TCPSite(runner, "127.0.0.1", port, ssl_context=tls).start()
+        await web.TCPSite(runner, "127.0.0.1", port, ssl_context=self._credentials.tls()).start()
         self.port = runner.addresses[0][1]
         self._started.set()
         await self._stop.wait()

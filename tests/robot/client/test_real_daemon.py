@@ -16,7 +16,7 @@ from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
-from shapechanger.robot.daemon.credentials import load_credentials, make_credentials
+from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.link.messages import Judge, Recordings
 from tests.robot.client.robot import STATE, eventually
 from tests.robot.daemon.plans import car_plan
@@ -38,11 +38,9 @@ class Served:
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **plan: Any) -> None:
         made = make_credentials(folder, "test car")
         self.known_at = made.fingerprint.hex()
-        self.key = load_credentials(folder).key_file.read_text().strip()
+        self.key = made.key
         self._plan = car_plan(
-            certificate=str(made.certificate),
-            private_key=str(made.private_key),
-            key_file=str(made.key_file),
+            credentials=str(folder),
             state_layout=Layout(STATE).to_json(),
             control_hz=HZ,
             **plan,

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.robot.daemon.credentials import make_credentials, read_key
+from shapechanger.robot.daemon.credentials import load_credentials, make_credentials
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.hardware import Clock
+from shapechanger.robot.link.authentication import parse_key
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Running, running
@@ -39,9 +40,7 @@ def plan(request: pytest.FixtureRequest, tmp_path: Path) -> DaemonPlan:
     for marker in reversed([*request.node.iter_markers("plan")]):
         changes |= marker.kwargs
     if changes.pop("secured", False):
-        made = make_credentials(tmp_path / "car", "car")
-        names = ("certificate", "private_key", "key_file")
-        changes |= {name: str(getattr(made, name)) for name in names}
+        changes["credentials"] = str(make_credentials(tmp_path / "car", "car").folder)
     for name in changes.keys() & {"recordings", "policies"}:  # Folders, or "" for none.
         changes[name] = changes[name] and str(tmp_path / changes[name])
     return car_plan(**changes)
@@ -50,7 +49,8 @@ def plan(request: pytest.FixtureRequest, tmp_path: Path) -> DaemonPlan:
 @pytest.fixture
 def key(plan: DaemonPlan) -> bytes:
     """The key of the robot; empty for none."""
-    return read_key(Path(plan.key_file)) if plan.key_file else b""
+    made = plan.credentials and load_credentials(Path(plan.credentials))
+    return parse_key(made.key) if made else b""
 
 
 @pytest.fixture

@@ -149,7 +149,7 @@ class Running:
 
     @property
     def url(self) -> str:
-        return f"{'https' if self.plan.certificate else 'http'}://127.0.0.1:{self.port}"
+        return f"{'https' if self.plan.credentials else 'http'}://127.0.0.1:{self.port}"
 
     @contextlib.asynccontextmanager
     async def connect(self, **settings: Any) -> AsyncIterator[Client]:

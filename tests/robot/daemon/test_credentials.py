@@ -15,9 +15,8 @@ from shapechanger.robot.daemon.credentials import (
     credentials_folder,
     load_credentials,
     make_credentials,
-    read_key,
-    server_tls,
 )
+from shapechanger.robot.link.authentication import parse_key
 from shapechanger.robot.serve import recordings_folder
 from tests.robot.daemon.plans import car_plan
 
@@ -26,16 +25,17 @@ def test_credentials_are_made_once_and_are_the_owners(tmp_path: Path) -> None:
     folder = tmp_path / "a" / "car"
     made = make_credentials(folder, "my car")
     assert make_credentials(folder, "my car") == made == load_credentials(folder)
-    modes = [path.stat().st_mode & 0o777 for path in (folder, made.key_file, made.private_key)]
+    paths = (folder, folder / "key", folder / "certificate.key")
+    modes = [path.stat().st_mode & 0o777 for path in paths]
     assert modes == [0o700, 0o600, 0o600]
-    certificate = x509.load_pem_x509_certificate(made.certificate.read_bytes())
+    certificate = x509.load_pem_x509_certificate((folder / "certificate.pem").read_bytes())
     assert certificate.subject.rfc4514_string() == "CN=my car"
     assert certificate.not_valid_before_utc < datetime(2020, 1, 2, tzinfo=UTC)
     assert certificate.not_valid_after_utc > datetime.now(UTC) + timedelta(days=3_600)
     other = make_credentials(tmp_path / "b", "my car")
     assert made.fingerprint != other.fingerprint
-    keys = [read_key(one.key_file) for one in (made, other)]
-    assert (len(keys[0]), keys[0] == keys[1]) == (16, False)
+    assert (len(parse_key(made.key)), made.key == other.key) == (16, False)
+    assert made.key not in repr(made)
 
 
 @pytest.mark.parametrize("name", ["key", "certificate.key"])
@@ -64,11 +64,10 @@ def test_incomplete_and_malformed_credentials_are_refused(tmp_path: Path, name: 
 
 def test_tls_1_3_and_the_key_of_the_certificate_are_required(tmp_path: Path) -> None:
     one, two = (make_credentials(tmp_path / name, name) for name in ("one", "two"))
-    context, fingerprint = server_tls(one.certificate, one.private_key)
-    assert context.minimum_version is ssl.TLSVersion.TLSv1_3
-    assert fingerprint == one.fingerprint
+    assert one.tls().minimum_version is ssl.TLSVersion.TLSv1_3
+    (two.folder / "certificate.key").replace(one.folder / "certificate.key")
     with pytest.raises(RobotError, match="do not match"):
-        server_tls(one.certificate, two.private_key)
+        one.tls()
 
 
 _FOLDERS = {
@@ -97,11 +96,9 @@ def test_folders_follow_the_xdg_specification(
 def test_serving_other_machines_needs_a_key() -> None:
     check_exposure(car_plan(host="127.0.0.1"))
     check_exposure(car_plan(host="0.0.0.0", insecure=True))
-    secured = {"certificate": "c", "private_key": "p", "key_file": "k"}
-    check_exposure(car_plan(host="0.0.0.0", **secured))
-    for missing in secured:
-        with pytest.raises(RobotError, match="--insecure"):
-            check_exposure(car_plan(host="0.0.0.0", **(secured | {missing: ""})))
+    check_exposure(car_plan(host="0.0.0.0", credentials="c"))
+    with pytest.raises(RobotError, match="--insecure"):
+        check_exposure(car_plan(host="0.0.0.0"))
 
 
 def test_reading_credentials_does_not_import_the_certificate_builder() -> None:

@@ -63,7 +63,7 @@ def one(
     one._command = _COMMAND
 
     async def serve() -> None:
-        one.serve(5000, b"\x01" * 32)
+        one.serve(5000, "KEY", b"\x01" * 32)
 
     runner.run(serve())
     yield one
@@ -79,7 +79,7 @@ async def test_a_policy_starts_with_the_robot_and_another_takes_its_place(
     assert said[-1].names == _NAMES
     assert said[0].text == "It starts."
     robot = json.loads(said[1].text)
-    assert (robot["address"], robot["key"]) == ("127.0.0.1:5000", "")
+    assert (robot["address"], robot["key"]) == ("127.0.0.1:5000", "KEY")
     assert robot["fingerprint"] == "01" * 32
     with pytest.raises(Declined, match="student runs already"):
         one.run("student")

@@ -133,7 +133,7 @@ class RobotInit:
         say(
             f"wrote {profile}: check its pins before anything moves\n"
             f"{'wrote' if is_new else 'kept'} {unit}: its systemd unit\n"
-            f"key and certificate in {credentials.key_file.parent}\n\n"
+            f"key and certificate in {credentials.folder}\n\n"
             f"{shown_credentials(credentials)}\n"
         )
         if not installs:
@@ -186,10 +186,9 @@ class RobotKey:
 
 def shown_credentials(credentials: Credentials) -> str:
     """Format the key and the fingerprint for people to compare."""
-    key = credentials.key_file.read_text().strip()
     fingerprint = credentials.fingerprint
     return (
-        f"key          {key}\n"
+        f"key          {credentials.key}\n"
         f"fingerprint  {fingerprint.hex()}\n"
         f"in short     {fingerprint_short(fingerprint)}"
     )

@@ -166,8 +166,8 @@ def _wiring(robot: StandingRobot) -> Checks:
 
 
 def _credentials(robot: StandingRobot) -> Results:
-    folder = load_credentials(robot.credentials or credentials_folder(robot.profile.name))
-    yield "good", f"Key and certificate: {folder.key_file.parent}."
+    made = load_credentials(robot.credentials or credentials_folder(robot.profile.name))
+    yield "good", f"Key and certificate: {made.folder}."
 
 
 def _unit(robot: StandingRobot) -> Results:

@@ -27,19 +27,27 @@ _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """Files that identify a robot to its clients.
+    """Key and certificate that identify a robot to its clients.
 
     Attributes:
-        key_file: Key that clients must hold.
-        certificate: Certificate (PEM).
-        private_key: Private key of the certificate (PEM).
+        folder: Folder of their files.
+        key: Key that clients must hold, as people write it.
         fingerprint: SHA-256 of the certificate (DER).
     """
 
-    key_file: Path
-    certificate: Path
-    private_key: Path
+    folder: Path
+    key: str = field(repr=False)  # Keep the key out of logs.
     fingerprint: bytes
+
+    def tls(self) -> ssl.SSLContext:
+        """Return the server's context for TLS 1.3 or newer."""
+        certificate, private_key = self.folder / _CERTIFICATE, self.folder / _PRIVATE_KEY
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.minimum_version = ssl.TLSVersion.TLSv1_3
+        text = f"{certificate} and {private_key} do not match"
+        with translate_errors(OSError, to=lambda error: RobotError(f"{text}: {error}.")):
+            context.load_cert_chain(certificate, private_key)
+        return context
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,54 +119,28 @@ def make_credentials(folder: Path, name: str) -> Credentials:
 
 
 def load_credentials(folder: Path) -> Credentials:
-    """Read the credentials in a folder."""
-    key, certificate, private_key = folder / _KEY, folder / _CERTIFICATE, folder / _PRIVATE_KEY
-    read_key(key)
-    _check_private(private_key)
-    return Credentials(key, certificate, private_key, _fingerprint(certificate))
-
-
-def read_key(file: Path) -> bytes:
-    """Read the key in a file."""
-    _check_private(file)
-    text = f"Cannot read the key in {file}"
-    with translate_errors(OSError, ValueError, LinkError, to=lambda e: RobotError(f"{text}: {e}")):
-        return parse_key(file.read_text())
-
-
-def server_tls(certificate: Path, private_key: Path) -> tuple[ssl.SSLContext, bytes]:
-    """Return the server's context for TLS 1.3 or newer, and the fingerprint of its certificate."""
-    _check_private(private_key)
-    fingerprint = _fingerprint(certificate)
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.minimum_version = ssl.TLSVersion.TLSv1_3
-    text = f"{certificate} and {private_key} do not match"
-    with translate_errors(OSError, to=lambda error: RobotError(f"{text}: {error}.")):
-        context.load_cert_chain(certificate, private_key)
-    return context, fingerprint
+    """Read and check the credentials in a folder."""
+    for file in (folder / _KEY, folder / _PRIVATE_KEY):
+        with _readable(file):
+            mode = file.stat().st_mode
+        if mode & _OTHERS:
+            raise RobotError(
+                f"Other users can read {file}. Run `chmod 600 {file}`, or better, make a new one."
+            )
+    with _readable(folder / _KEY):
+        key = (folder / _KEY).read_text().strip()
+        parse_key(key)
+    with _readable(folder / _CERTIFICATE):
+        der = ssl.PEM_cert_to_DER_cert((folder / _CERTIFICATE).read_text().strip())
+    return Credentials(folder, key, fingerprint_of(der))
 
 
 def check_exposure(plan: DaemonPlan) -> None:
     """Refuse to serve other machines without TLS and a key."""
-    secured = plan.certificate and plan.private_key and plan.key_file
-    if not (secured or plan.insecure or is_loopback(plan.host)):
+    if not (plan.credentials or plan.insecure or is_loopback(plan.host)):
         raise RobotError(
             f"Other machines reach {plan.host}, and could drive the robot without a key. Run "
             "`shapechanger robot init`, listen at 127.0.0.1, or pass `--insecure`."
-        )
-
-
-def _fingerprint(certificate: Path) -> bytes:
-    with _readable(certificate):
-        return fingerprint_of(ssl.PEM_cert_to_DER_cert(certificate.read_text().strip()))
-
-
-def _check_private(file: Path) -> None:
-    with _readable(file):
-        mode = file.stat().st_mode
-    if mode & _OTHERS:
-        raise RobotError(
-            f"Other users can read {file}. Run `chmod 600 {file}`, or better, make a new one."
         )
 
 
@@ -168,9 +150,9 @@ def _readable(file: Path) -> contextlib.AbstractContextManager[None]:
     def refusal(error: Exception) -> RobotError:
         if isinstance(error, FileNotFoundError):
             return RobotError(f"{file} does not exist. Run `shapechanger robot init` to make it.")
-        return RobotError(f"Cannot read {file}: {error}.")
+        return RobotError(f"Cannot read {file}: {str(error).rstrip('.')}.")
 
-    return translate_errors(OSError, ValueError, to=refusal)
+    return translate_errors(OSError, ValueError, LinkError, to=refusal)
 
 
 def _self_signed(name: str) -> tuple[bytes, bytes]:

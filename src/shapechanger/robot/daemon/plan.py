@@ -20,10 +20,8 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         camera: Settings of the camera; None without one.
         host: Address to listen at.
         port: Port to listen at; 0 for any free port.
-        certificate: File of the certificate (PEM); "" for no TLS.
-        private_key: File of its private key (PEM).
-        key_file: File of the key that clients must hold; "" for none.
-        insecure: Whether to serve other machines without TLS or a key.
+        credentials: Folder of the robot's key and certificate; "" for none, and no TLS.
+        insecure: Whether to serve without TLS, other machines too.
         discovery: Whether to announce the robot on the local network.
         ready_file: File that the port is written to; "" for none.
         recordings: Folder of the recorded episodes; "" for none.
@@ -36,9 +34,7 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     camera: CameraPlan | None = None
     host: str = "127.0.0.1"
     port: Annotated[int, Meta(ge=0, le=65535)] = DEFAULT_PORT
-    certificate: str = ""
-    private_key: str = ""
-    key_file: str = ""
+    credentials: str = ""
     insecure: bool = False
     discovery: bool = True
     ready_file: str = ""

@@ -63,12 +63,12 @@ class PolicyRunner:
         self._text = ""
         self._task: asyncio.Task[None] | None = None
 
-    def serve(self, port: int, fingerprint: bytes) -> None:
+    def serve(self, port: int, key: str, fingerprint: bytes) -> None:
         """Start the policy that starts with the robot, once the robot can be reached."""
         self._robot = {
             "name": self._plan.card.robot,
             "address": str(address_here(self._plan.host, port)),
-            "key": Path(self._plan.key_file).read_text().strip() if self._plan.key_file else "",
+            "key": key,
             "fingerprint": fingerprint.hex() if fingerprint else "insecure",
         }
         if self._plan.policy:

@@ -34,7 +34,7 @@ from shapechanger.robot.guard.channel import GuardState, Heartbeat, Order
 from shapechanger.robot.guard.running import log_to_stderr, read_plan_fd, run_early
 from shapechanger.robot.hardware import Clock, connect
 from shapechanger.robot.link.address import Address, is_loopback
-from shapechanger.robot.link.authentication import fingerprint_short
+from shapechanger.robot.link.authentication import fingerprint_short, parse_key
 
 _log = logging.getLogger("shapechanger.robot.daemon")
 
@@ -158,13 +158,14 @@ class Daemon:
         """
         hub, plan = self._hub, self._hub.plan
         credentials.check_exposure(plan)
-        key = credentials.read_key(Path(plan.key_file)) if plan.key_file else b""
-        tls, fingerprint = None, b""
-        if plan.certificate:
-            tls, fingerprint = credentials.server_tls(
-                Path(plan.certificate), Path(plan.private_key)
-            )
-        server = Server(hub, credentials.Authenticator(key, fingerprint), tls)
+        key, tls, fingerprint = "", None, b""
+        if plan.credentials:
+            made = credentials.load_credentials(Path(plan.credentials))
+            key = made.key
+            if not plan.insecure:
+                tls, fingerprint = made.tls(), made.fingerprint
+        authenticator = credentials.Authenticator(parse_key(key) if key else b"", fingerprint)
+        server = Server(hub, authenticator, tls)
         beating = asyncio.create_task(self._beat())
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
@@ -175,7 +176,7 @@ class Daemon:
                 await self._guard_reported.wait()
             if not self._ended.is_set():
                 port = await server.start()
-                hub.policies.serve(port, fingerprint)
+                hub.policies.serve(port, key, fingerprint)
                 self._report_ready(port, fingerprint)
                 if plan.discovery and is_loopback(plan.host):
                     text = "%s is not announced: only this machine reaches %s."
