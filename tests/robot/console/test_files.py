@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.console import ENTRY, console_files
+from shapechanger.robot.daemon.server import ENTRY, console_files
 
 
 def test_the_page_refers_only_to_existing_files() -> None:

@@ -11,13 +11,13 @@ import ssl
 from collections import Counter
 from collections.abc import Awaitable, Callable, Hashable
 from functools import partial
+from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
 
 from aiohttp import web
 
 from shapechanger.errors import LinkError, RobotError, translate_errors
-from shapechanger.robot.console import ENTRY, console_files
 from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.session import Session
@@ -196,6 +196,37 @@ _HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
+
+
+ENTRY: Final = "index.html"
+"""Page of the console, on which a person drives and records."""
+
+_FOLDER: Final = Path(__file__).parents[1] / "console"
+# Media types to serve; other files in the folder are not served.
+_KINDS: Final = {
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+}
+
+
+def console_files(folder: Path = _FOLDER) -> dict[str, tuple[str, bytes]]:
+    """Return the media type and the content (UTF-8) of each file of the console.
+
+    Raises:
+        RobotError: If they cannot be read, for example after a failed installation.
+    """
+    failed = f"Cannot read the console in {folder}"
+    with translate_errors(OSError, to=lambda error: RobotError(f"{failed}: {error}.")):
+        files = {
+            path.name: (_KINDS[path.suffix], path.read_bytes())
+            for path in sorted(folder.iterdir())
+            if path.suffix in _KINDS
+        }
+    if ENTRY not in files:
+        raise RobotError(f"{folder} has no {ENTRY}: install shapechanger again.")
+    return files
 
 
 def origin_refusal(origin: str | None, host: str, *, is_open: bool) -> str:

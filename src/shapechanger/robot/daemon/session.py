@@ -55,10 +55,6 @@ _BY_PERSONS: Final = (messages.Record, messages.Mark, messages.Undo, messages.Ju
 _OF_RECORDINGS: Final = (*_BY_PERSONS, messages.Browse, messages.Fetch)
 
 
-class WrongKey(RobotRefused):
-    """The client does not hold the key."""
-
-
 def printable(text: str) -> str:
     """Return `text` as one line, without control characters."""
     return "".join(c if c.isprintable() else " " for c in text).strip()
@@ -124,7 +120,7 @@ class Session:
                 f"{hello.version}: install the same version of shapechanger on both."
             )
         if not self._authenticator.accepts(hello, self._nonce):
-            raise WrongKey(
+            raise RobotRefused(
                 "Wrong key. `shapechanger robot key NAME` shows the right one on the robot."
             )
         hub, client = self._hub, self.client
@@ -312,7 +308,7 @@ class Session:
             _log.info("%s disconnected.", client.name)
         except ShapechangerError as error:
             reason = error
-            if isinstance(error, WrongKey):
+            if isinstance(error, RobotRefused) and not self._is_known:
                 await asyncio.sleep(_WRONG_KEY_S)
         finally:
             # If this client was in control, stop the robot first.
