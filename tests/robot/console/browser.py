@@ -9,6 +9,7 @@ import msgspec
 from playwright.sync_api import Browser, Page, TimeoutError
 
 from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.twin.ledger import Transition
 from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.twin.robots import until
@@ -195,9 +196,9 @@ class Pins:
         until(lambda: self.propels() == 0.0, 60.0)
         self.forget()
 
-    def await_deadline(self, observer: RobotClient) -> None:
+    def await_deadline(self, observer: RobotClient, before: Observation) -> None:
         """Wait for rest, and check that it comes within the deadline after the last command."""
-        commands = [observer.ask().message.command_ns or 0]
+        commands = [before.command_ns or 0]
 
         def rests() -> bool:
             commands.append(observer.ask().message.command_ns or 0)

@@ -51,11 +51,12 @@ def test_a_slow_page_stops_its_robot_and_delays_no_other_client(
     console.arm()
     console.drive("w", pins)
     with hasty_car.client(frames=False) as observer:
+        before = observer.ask().message
         console.page.evaluate(
             "setTimeout(() => { const end = performance.now() + 2000;"
             " while (performance.now() < end); document.body.dataset.hung = 'over'; })"
         )
-        pins.await_deadline(observer)
+        pins.await_deadline(observer, before)
         # Another client still gets observations, some before the page recovers.
         for _ in range(10):
             observer.ask()
