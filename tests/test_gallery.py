@@ -18,7 +18,7 @@ GALLERY = PICTURES.parent / "gallery.md"
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_the_command_draws_one_clip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`--only` draws one, into the given folder: four pendulums side by side, larger and larger."""
+    """`--only` draws one clip into the given folder: four pendulums, in the order of their size."""
     monkeypatch.setattr(
         sys, "argv", ["draw_pictures.py", "--only", "balancing", "--out", str(tmp_path)]
     )

@@ -44,7 +44,7 @@ def test_a_given_body_overrides_towards() -> None:
 
 
 def test_copies_draw_the_same_bodies() -> None:
-    """Pickles and specs have both ends instead of the present body."""
+    """Pickles and specs store the two bodies to draw between, not the body drawn last."""
     env = gym.make("shapechanger/Ant-v1", towards="BigAnt", fast_model=False)
     drawn = _heights(env, [3, 4])
     assert env.spec is not None
@@ -53,7 +53,7 @@ def test_copies_draw_the_same_bodies() -> None:
 
 
 def test_vector_envs_draw_one_body_per_env() -> None:
-    """Bodies equal single envs' with the same seeds."""
+    """Each env draws the same body as a single env with its seed."""
     envs = shapechanger.make_vec("shapechanger/Ant-v1", 3, towards="BigAnt", fast_model=False)
     envs.reset(seed=5)
     drawn = [env.unwrapped.standing_height for env in envs.envs]

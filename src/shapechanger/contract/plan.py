@@ -40,7 +40,7 @@ class ActionPlan:
         name: Name, such as "steering".
         low: Lower cap; smaller values are clipped.
         high: Upper cap. The full range of an action is -1 to 1, or 0 to 1 if `one_sided`.
-        rest: Value at rest, the end of every stop.
+        rest: Value at rest, at which every stop ends.
         slew_per_s: Fastest change away from rest, 1/s.
         slew_down_per_s: Fastest change towards rest, 1/s. An action that propels has no limit.
         levels: "any", or "three" for a motor with only full left, off and full right.
@@ -65,7 +65,7 @@ class ActionPlan:
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Yield each key that contradicts others, and an explanation that ends a sentence."""
+        """Yield each key that contradicts others, with the reason as the end of a sentence."""
         if self.one_sided and self.low < 0.0:
             yield "low", "must be 0 to 1, because it is one-sided"
         if not self.low < self.high:

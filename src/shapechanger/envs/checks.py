@@ -22,7 +22,7 @@ from shapechanger.errors import (
     check_seed,
 )
 
-# Kinds of NumPy dtypes: booleans, integers and floats; like Gymnasium, batches refuse booleans.
+# Kinds of NumPy dtypes. As in Gymnasium, batches may be complex, but not boolean.
 _NUMBERS: Final = "biuf"
 _BATCH_NUMBERS: Final = "iufc"
 _LONGEST_BODY: Final = 60
@@ -195,7 +195,7 @@ def describe_body(env: gym.Env[Any, Any]) -> str:
 
 
 def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
-    """Return one seed per env; a single number counts up from the first env.
+    """Return one seed per env; a single number is the first env's seed, and the others count up.
 
     Args:
         seed: A number, one seed per env, or None.
@@ -242,6 +242,6 @@ def masked_options(
         raise TypeError(f"`reset_mask` must be an array of booleans, not of {kind}.")
     if given.shape != (num_envs,) or not given.any():
         raise ValueError(
-            f"`reset_mask` must have the shape ({num_envs},) and be true for an env, got {given}."
+            f"`reset_mask` must have the shape ({num_envs},) and select an env, got {given}."
         )
     return given.copy(), {key: value for key, value in options.items() if key != "reset_mask"}

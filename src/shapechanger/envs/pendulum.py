@@ -118,7 +118,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         bound.move()
         observation = np.concatenate((bound.qpos, bound.qvel))
         numbers = observation.tolist()
-        # A sum is finite only if every number is; one that is not may have overflowed.
+        # A finite sum proves that all numbers are finite; an infinite sum may be an overflow.
         finite = math.isfinite(sum(numbers)) or bool(np.isfinite(observation).all())
         terminated = not finite or abs(numbers[1]) > FALLEN_RAD
         reward = int(not terminated)
@@ -225,7 +225,7 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
         return [position_features(model)[0], *angles, *velocities, force]
 
     def step(self, action: Any) -> Any:
-        """Take one step, and end the episode at a height in proportion to the poles."""
+        """Take one step; the height that ends the episode is proportional to the poles' length."""
         observation, reward, _, truncated, info = cast("Any", super()).step(action)
         return observation, reward, self._fallen, truncated, info
 

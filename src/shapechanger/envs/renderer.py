@@ -34,7 +34,7 @@ _SQUARE_M: Final = 0.5
 
 @functools.cache
 def _require_context() -> None:
-    """Require that MuJoCo can render, once; otherwise Gymnasium's renderer fails unclearly."""
+    """Check once that MuJoCo can render, because Gymnasium's renderer gives no clear error."""
     open_context(16, 16).free()
 
 
@@ -130,7 +130,7 @@ class Renderer(MujocoRenderer):
 
 
 def _floors(model: mujoco.MjModel) -> dict[int, _Floats]:
-    """Return the level floors with tiles, and the width and depth after which these repeat, m."""
+    """Return the level floors with tiles, and the period of the tiles along x and y, m."""
     found: dict[int, _Floats] = {}
     for floor in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).tolist():
         material, size = model.geom_matid[floor], model.geom_size[floor, :2]
@@ -253,8 +253,8 @@ def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
 
     Args:
         spec: The model.
-        bare_floors: Whether planes without a material are drawn. The double pendulum's has no tiles
-            and lies far below it.
+        bare_floors: Whether planes without a material are drawn. The double pendulum has such a
+            plane, far below it.
     """
     for texture in spec.textures:
         if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:

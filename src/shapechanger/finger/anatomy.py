@@ -23,7 +23,7 @@ first palmar interosseous."""
 
 PHALANGES: Final = ("proximal", "middle", "distal")
 
-# Shares of a hand's length, 0.245, 0.143 and 0.097 (Buchholz, Armstrong & Goldstein 1992,
+# Fractions of a hand's length, 0.245, 0.143 and 0.097 (Buchholz, Armstrong & Goldstein 1992,
 # "Anthropometric data for describing the kinematics of the human hand", Ergonomics 35:261, as
 # quoted in other models), times 189 mm.
 PHALANX_LENGTH_M: Final = (0.0463, 0.0270, 0.0183)
@@ -57,9 +57,9 @@ Chosen."""
 JOINT_STIFFNESS: Final[NDArray[np.float64]] = np.array([0.04, 0.04, 0.02, 0.008])
 """Passive joint stiffness around the rest angles, N·m/rad."""
 END_STIFFNESS: Final = 4.0
-"""Stiffness of a joint at the farther end of its range over that at rest. The torque of human
-knuckles rises there like an exponential (fitted by Kuo & Deshpande 2012, J. Biomechanics 45:2531);
-a cubic rises similarly, and this size is chosen."""
+"""Ratio of a joint's stiffness at the farther end of its range to its stiffness at rest. The torque
+of human knuckles rises exponentially there (fitted by Kuo & Deshpande 2012, J. Biomechanics
+45:2531); a cubic rises similarly. The value is chosen."""
 
 JOINT_DAMPING: Final[NDArray[np.float64]] = np.array([0.015, 0.015, 0.010, 0.005])
 """Passive joint damping, N·m·s/rad. Chosen so that even full, alternating tensions move no joint
@@ -71,11 +71,12 @@ JOINT_FRICTION: Final[NDArray[np.float64]] = np.array([1.0, 1.0, 0.7, 0.4]) * 1e
 
 # Moment arms, mm. The laboratory of Valero-Cuevas publishes the force and torque at the fingertip
 # of each tendon of a cadaver's index finger (R/main.r of github.com/bc/stfeasibility), in an
-# unspecified posture. FDS and DI pass the end joint without an arm, which gives the lever of this
-# joint: 16 mm, flexed by 10 degrees. With knuckle and middle joint flexed by 45 degrees, as in
-# other work of that laboratory, and the two phalanges above, the arms below follow; a different
-# posture causes small errors. Often quoted numbers of An et al. 1983 (J. Biomechanics 16:419)
-# differ from these by up to 4 mm, and no tensions balance those.
+# unspecified posture. FDS and DI have no moment arm at the end joint, so their forces and torques
+# give its lever: 16 mm, with the joint flexed by 10 degrees. The arms below also assume that the
+# knuckle and the middle joint are flexed by 45 degrees, as in other work of that laboratory, and
+# the lengths of the first two phalanges above; a different posture causes small errors. The often
+# quoted arms of An et al. 1983 (J. Biomechanics 16:419) differ from these by up to 4 mm, and with
+# them no set of tensions keeps the finger in equilibrium.
 _MOMENT_ARMS_MM: Final = {
     "FDP": (8.6, -2.7, 4.9, 3.6),
     "FDS": (9.0, -1.3, 4.0, 0.0),
@@ -86,7 +87,7 @@ _MOMENT_ARMS_MM: Final = {
     "PI": (3.6, -6.4, -2.3, -1.65),
 }
 MOMENT_ARMS: Final[NDArray[np.float64]] = np.array([_MOMENT_ARMS_MM[t] for t in TENDONS]) * 1e-3
-"""Torque about each joint per newton of each tendon, m, (7, 4); zero where a tendon passes no
+"""Torque about each joint per newton of each tendon, m, (7, 4); zero if a tendon does not cross the
 joint."""
 
 # An, Ueba, Chao, Cooney & Linscheid 1983, "Tendon excursion and moment arm of index finger
@@ -102,8 +103,8 @@ _AN_1983_MM: Final = {
     "PI": (6.6, -5.8, -2.6, -1.6),
 }
 AN_1983_ARMS: Final[NDArray[np.float64]] = np.array([_AN_1983_MM[t] for t in TENDONS]) * 1e-3
-"""Another set of moment arms, m, (7, 4). No tensions balance it: none extend the knuckle without
-moving another joint, so passive tissue has to hold those."""
+"""Another set of moment arms, m, (7, 4). With these arms no set of tensions is in equilibrium: all
+tensions that extend the knuckle also move another joint, which passive tissue has to hold."""
 
 # From the same laboratory and file.
 FORCE_POTENTIAL_N: Final[NDArray[np.float64]] = np.array(

@@ -1,4 +1,4 @@
-"""The finger as a MuJoCo model and as an MJCF file: hinges, and tendons that carry the physics."""
+"""The finger as a MuJoCo model and as an MJCF file: hinges that are moved by tendons."""
 
 from __future__ import annotations
 
@@ -42,12 +42,13 @@ _SIM_DT_STRETCHED: Final = 0.0005
 """Simulation step with tendons that stretch, s: a light spool on a stiff spring oscillates at 100
 Hz and more."""
 _SIM_DT_GEARED: Final = 0.001
-_GEARED_KG: Final = 0.5
-"""Simulation step with heavier motors than this, s: with gears they oscillate at some 20 Hz. The
+"""Simulation step with tendons that stretch and geared motors, s: they oscillate at some 20 Hz. The
 error of each step is a row of `python -m benchmarks.run finger-physics`."""
+_GEARED_KG: Final = 0.5
+"""Mass above which motors count as geared, kg."""
 
-# Former commands that a motor with a delay has at least, s, so that fingers with other delays have
-# arrays of the same shapes.
+# Shortest history of commands that a motor with a delay keeps, s, so that fingers with different
+# delays have arrays of the same shapes.
 _KEPT_S: Final = 0.020
 
 FINGERTIP: Final = "fingertip"
@@ -80,8 +81,9 @@ def build_finger(
 ) -> mujoco.MjSpec:
     """Build the MuJoCo model of a finger.
 
-    Controls are the commands of the drive, -1 to 1, in the order of `TENDONS`; with a path, they
-    are the tensions from the least, -1, to the most, 1, see `HeldTensions`. Tendons have the names
+    Controls are the commands of the drive, -1 to 1, in the order of `TENDONS`. If the parameters
+    have a command path, controls are tensions instead: -1 is the least and 1 the most tension; see
+    `HeldTensions`. Tendons have the names
     of `TENDONS`, and lengths relative to the straight finger, m. A tendon that stretches has a
     motor: a slide joint such as `FDP/motor`, whose travel winds it up.
 
@@ -237,7 +239,7 @@ def _add_tendon(
 class FingerFigure:
     """Visual model of a finger with its anatomy, posed from outside and never simulated.
 
-    It serves for every finger, because their differences are invisible.
+    One figure can show any finger, because fingers do not differ visibly.
     """
 
     def __init__(self) -> None:
@@ -254,7 +256,7 @@ class FingerFigure:
     ) -> None:
         """Set joint angles, rad, (4,), and the target of the fingertip, m, (3,).
 
-        `pulled` are the tensions over the largest, 0 to 1, (7,), shown as thickness.
+        `pulled` are the tensions as fractions of the largest ones, (7,), shown as thickness.
         """
         widths = THINNEST_M + (THICKEST_M - THINNEST_M) * pulled.clip(0.0, 1.0)
         for courses, width in zip(self._courses, widths, strict=True):
@@ -318,7 +320,7 @@ _EXACT: Final[Mapping[str, Mapping[str, str]]] = {
 def finger_mjcf(parameters: FingerParameters, drive: TendonDrive) -> str:
     """Return the MJCF of a finger with its anatomy, parameters and, as a comment, its limits.
 
-    Controls are the commands of the drive; with a path, they are tensions.
+    Controls are the commands of the drive, or tensions if the parameters have a command path.
     """
     spec = build_finger(parameters, drive, anatomy=True)
     model: Any = spec.compile()
@@ -378,11 +380,11 @@ def _limits(parameters: FingerParameters) -> str:
     if path is not None:
         slews = [f"{v:g}" if v else "unlimited" for v in (path.slew_per_s, path.slew_down_per_s)]
         comments.append(
-            f"Nor the path of a command: tensions are computed at {path.control_hz:g} Hz, sent at "
+            f"Nor how commands are sent: tensions are computed at {path.control_hz:g} Hz, sent at "
             f"{path.tick_hz:g} Hz, with a slew of {slews[0]} up and {slews[1]} down, in ranges per "
             f"second, and steps of {path.tension_step:g} N. The controls are tensions from the "
             "least to the most."
         )
     delay = f"{1e3 * parameters.command_delay:g} ms"
-    comments.append(f"The delay of the commands, {delay}, is the actuators' (MuJoCo 4).")
+    comments.append(f"The actuators have the delay of the commands, {delay} (needs MuJoCo 4).")
     return " " + "\n  ".join(comments) + " "

@@ -53,10 +53,10 @@ def test_invalid_logs_are_refused(tmp_path: Path, finger: Cli) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["log.npz"]
 
 
-def test_motors_are_taken_for_geared_where_the_log_says_nothing(
+def test_geared_motors_can_be_assumed_if_the_log_does_not_describe_them(
     tmp_path: Path, finger: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`--geared` gives a log the shipped rig's motors, and leaves those that a log has."""
+    """`--geared` gives a log the shipped rig's motors, unless the log describes its motors."""
     log, _ = recorded(2.4)
     own = NOMINAL.replace(motor_kg=0.5)
     save_log(dataclasses.replace(log, motors=None), tmp_path / "log.npz")
@@ -75,7 +75,7 @@ def test_motors_are_taken_for_geared_where_the_log_says_nothing(
 
 @pytest.mark.slow
 def test_a_finger_is_identified(tmp_path: Path, finger: Cli) -> None:
-    """Arms by tendon and joint, other parameters, those not determined, and a summary."""
+    """The output has a row per tendon and joint, the undetermined parameters, and a summary."""
     log, out = tmp_path / "log.npz", tmp_path / "finger.json"
     gap = ("--gap", "real-like", "--finger-seed", 3)
     finger.output("record", "Finger", "--out", log, "--seconds", 6, *gap)

@@ -107,8 +107,8 @@ MISTAKES = (
     ("check finger --faults", "there is nothing to stop"),
     ("check test-car.toml --leds --twin --trials 3", "--trials needs --faults"),
     ("check test-car.toml --no-one-shot", "--no-one-shot needs --faults"),
-    ("check test-car.toml --twin --jumper 20 21", "--jumper goes with none of --twin"),
-    ("check test-car.toml --leds --wheels-up", "--wheels-up goes with none of --twin"),
+    ("check test-car.toml --twin --jumper 20 21", "--jumper cannot be combined with --twin"),
+    ("check test-car.toml --leds --wheels-up", "--wheels-up cannot be combined with --twin"),
     ("check test-car.toml --wheels-up --jumper 20 28", "GPIO0 to GPIO27, got 28"),
     ("check test-car.toml --wheels-up --jumper 20 20", "A jumper joins two pins"),
     ("install car", "`shapechanger robot init car` writes your own"),
@@ -169,7 +169,7 @@ def test_a_twin_on_another_clock(robot: Cli, home: Path) -> None:
 
 
 def test_init_never_overwrites(robot: Cli, home: Path) -> None:
-    """Neither profile nor key; another profile of the same name has the same key."""
+    """Profile and key are kept; another profile of the same robot's name has the same key."""
     output = robot.output("init", "car", "--name", "rover")
     key = next(line.split()[1] for line in output.splitlines() if line.startswith("key  "))
     profile = home / "work" / "rover.toml"

@@ -129,7 +129,7 @@ def test_split_by_time() -> None:
 
 
 def test_split_by_episode() -> None:
-    """Whole episodes: at least the share, at least one, never all."""
+    """The test set is whole episodes: at least the share, at least one, and never all."""
     assert np.flatnonzero(evaluated_steps([6, 3, 1], "episode", 0.2)).tolist() == [6, 7, 8, 9]
     assert np.flatnonzero(evaluated_steps([6, 4], "episode", 0.01)).tolist() == [6, 7, 8, 9]
     assert evaluated_steps([6, 4], "episode", 0.99).sum() == 4

@@ -1,4 +1,4 @@
-"""Learning from images or states, with classes or regression, from scratch or further."""
+"""Learning from images or states, with classes or regression, from scratch or from a policy."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def driver() -> Cloned:
     return _cloned(corridor(600, 1), SMALL)
 
 
-def test_it_learns_which_key_is_held(keys: Cloned) -> None:
+def test_a_policy_learns_which_key_is_held(keys: Cloned) -> None:
     policy, training = keys
     report = evaluate(policy, stripes(90, 1))
     assert report.accuracy > 0.9
@@ -56,7 +56,7 @@ def test_it_learns_which_key_is_held(keys: Cloned) -> None:
     assert (report.head, policy.net.members) == ("class", 2)
     assert policy.card.steps == 200
     assert "% of the images are mirrored" in training.mirror_note
-    assert policy.card.settings.augmentation.mirror > 0.3  # The data go to both sides.
+    assert policy.card.settings.augmentation.mirror > 0.3  # The data steer to both sides.
 
 
 @pytest.mark.parametrize("inputs", ["picture", "state", "both"])
@@ -210,6 +210,6 @@ def test_invalid_data_are_refused() -> None:
         {"weight_decay": -1.0},
     ],
 )
-def test_settings_that_contradict_themselves_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(DemosError):
         CloneSettings(**wrong)  # pyright: ignore[reportArgumentType]

@@ -98,7 +98,8 @@ def test_long_episodes_and_several_videos(tmp_path: Path, monkeypatch: pytest.Mo
     expected = [in_32_bits(tuple(s.action[0] for s in e.steps)) for e in before]
     assert actions == expected
     first, second = pictures_of(before[2])[0], pictures_of(after[2])[0]
-    assert np.abs(first.astype(float) - second).mean() < 40.0  # Noise; other images: 85.
+    # The images are noise: two different ones have a mean difference of 85.
+    assert np.abs(first.astype(float) - second).mean() < 40.0
 
 
 def test_the_metadata(tmp_path: Path) -> None:
@@ -191,7 +192,9 @@ def test_refused_exports(
         ('{"format": 1, "episodes": [7]}', "Expected `object`, got `int`"),
     ],
 )
-def test_our_own_file_must_fit(tmp_path: Path, text: str, message: str) -> None:
+def test_a_file_of_ours_that_does_not_match_is_refused(
+    tmp_path: Path, text: str, message: str
+) -> None:
     smooth_drive(tmp_path / "data", 2)
     export_recording(tmp_path / "data", tmp_path / "set", "lerobot")
     own = tmp_path / "set/meta/shapechanger.json"
@@ -207,7 +210,8 @@ def test_our_own_file_must_fit(tmp_path: Path, text: str, message: str) -> None:
         own.write_text(json.dumps(spoilt))
         with pytest.raises(DemosError, match=problem):
             import_recording(tmp_path / "set", tmp_path / "back")
-    runs = {"drivers": [["policy", 1 << 30]]}  # Of no use, and not in memory.
+    # Steps beyond the end of the episode are ignored, and not expanded in memory.
+    runs = {"drivers": [["policy", 1 << 30]]}
     own.write_text(json.dumps(about | {"episodes": [about["episodes"][0] | runs]}))
     import_recording(tmp_path / "set", tmp_path / "back")
     assert {step.driver for step in all_of(tmp_path / "back")[0].steps} == {"policy"}

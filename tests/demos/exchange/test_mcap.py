@@ -69,12 +69,12 @@ def exported(tmp_path: Path) -> Path:
 
 
 def test_every_value_is_there(exported: Path) -> None:
-    """By topic, with the times of the robot's clock, and from the rate without times."""
+    """Each topic has its values, at the robot's times; missing times follow from the rate."""
     found = messages(exported)
     start = 7 * 10**9 + 5
     times = [at for at, _ in of(found, "/state")]
     assert times == [start, start + 10**8, start + 2 * 10**8]
-    # What nothing measured is left out.
+    # Quantities without a measurement are left out.
     assert [content for _, content in of(found, "/state")] == [
         {"map": [1.0, None]},
         {"speed": 2.0, "map": [3.0, 4.0]},

@@ -1,4 +1,4 @@
-"""Minari datasets of others: what is whole is imported, and the rest is named."""
+"""Minari datasets of other projects: intact episodes are imported, and others are reported."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def resized(length: int) -> Callable[[h5py.File], object]:
 
 
 def endless(file: h5py.File) -> None:
-    """Spoil an action of the second episode."""
+    """Make an action of the second episode infinite."""
     file["episode_1/actions"][2] = np.inf
 
 
@@ -116,7 +116,7 @@ def endless(file: h5py.File) -> None:
         ),
     ],
 )
-def test_episodes_that_are_whole_are_imported(
+def test_intact_episodes_are_imported(
     tmp_path: Path, change: Callable[[h5py.File], object], expected: list[list[int]], finding: str
 ) -> None:
     folder = write_set(tmp_path / "set", change=change)

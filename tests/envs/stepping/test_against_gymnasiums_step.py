@@ -75,7 +75,7 @@ _SEEDS = [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in ra
 
 @pytest.mark.parametrize("seed", [*_ANTS, *_SEEDS])
 def test_ants(seed: int | str) -> None:
-    """Named and random ants take Gymnasium's 1,000 steps with falls, resets and contacts."""
+    """Named and random ants equal Gymnasium's for 1,000 steps with falls, resets and contacts."""
     if isinstance(seed, str):
         ours, theirs = _ants(seed)
         seed = 1
@@ -90,7 +90,7 @@ def test_ants(seed: int | str) -> None:
 
 @pytest.mark.parametrize("seed", [*_POLES, *_SEEDS])
 def test_pendulums(seed: int | str) -> None:
-    """Named and random poles take Gymnasium's 1,000 steps, at the ends of the rail too."""
+    """Named and random poles equal Gymnasium's for 1,000 steps, also at the ends of the rail."""
     body = seed if isinstance(seed, str) else random_pendulum(seed)
     seed = 1 if isinstance(seed, str) else seed
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)

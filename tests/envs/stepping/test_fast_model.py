@@ -1,4 +1,4 @@
-"""Models with and without a fast model."""
+"""`find_fast_model`: the cheaper models that it finds move bit-equally, and when it finds none."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _viscous(spec: Any) -> None:
 
 
 def _undamped(spec: Any) -> None:
-    """Without dampers and springs, MuJoCo would leave out gravity compensation too."""
+    """Disable dampers: if springs were disabled too, MuJoCo would skip gravity compensation."""
     spec.option.disableflags = _DAMPER
     spec.body("shin").gravcomp = 1.0
 
@@ -123,7 +123,7 @@ _features = st.sampled_from([_stiff, _rough, _sensing, _dense, _viscous, _undamp
 @settings(deadline=None, max_examples=60)
 @given(floor=_geoms, trunk=_geoms, legs=_geoms, add=st.sets(_features))
 def test_a_fast_model_moves_as_its_model(floor: str, trunk: str, legs: str, add: set[Any]) -> None:
-    """With any parameters of contacts and any feature, bit for bit."""
+    """Motion is equal to the last bit, with any contact parameters and any features."""
     spec = _scene(floor=floor, trunk=f"{_SILENT} {trunk}", legs=f"{_SILENT} {legs}")
     for feature in add:
         feature(spec)
@@ -157,7 +157,7 @@ _FREE = '<body name="ball" pos="1 0 0.5"><freejoint/><geom name="ball" size="0.1
     ],
 )
 def test_unsupported_models_have_no_fast_model(parts: dict[str, str]) -> None:
-    """Nor have models whose order of contacts is ambiguous."""
+    """Unsupported elements, or an ambiguous order of contacts, prevent a fast model."""
     assert _fast_model_of(_scene(**parts))[1] is None
 
 
@@ -210,7 +210,7 @@ def test_any_difference_is_detected(change: Any) -> None:
 
 
 def test_envs_of_a_body_count_steps_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search starts after `patience` steps; an env that is made later has its result."""
+    """The search starts after `patience` steps in total, and later envs reuse its result."""
     monkeypatch.setattr(AntEnv, "patience", 6)
     tuned.shared_by.cache_clear()
     envs = [AntEnv(), AntEnv(), AntEnv()]
@@ -241,7 +241,7 @@ def test_the_number_of_remembered_bodies_is_bounded(monkeypatch: pytest.MonkeyPa
 
 
 def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> int:
-    """Assert that both models move equally under random controls; return how many contacts."""
+    """Assert that both models move equally under random controls; return the contact count."""
     rng = np.random.default_rng(1)
     one, two = mujoco.MjData(model), mujoco.MjData(model)
     contacts = 0
@@ -258,7 +258,7 @@ def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> int:
 
 
 def test_a_spec_of_another_model_gives_no_fast_model() -> None:
-    """The rules would not hold for it."""
+    """A fast model that is built from another model's spec moves differently and is rejected."""
     spec = _scene()
     model = spec.compile()
     heavier = spec.copy()

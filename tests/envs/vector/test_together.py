@@ -1,4 +1,7 @@
-"""Batched conclusion of ant steps equals single envs'."""
+"""Rewards and observations computed for many ants at once equal single envs' results.
+
+`AntEnv.conclude` computes them after the physics, for all envs of one kind in a vector env.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def concluded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Record the number of ants in each batched conclusion."""
+    """Record the number of ants in each call of `AntEnv.conclude`."""
     counts: list[int] = []
     original = AntEnv.conclude
 
@@ -61,7 +64,7 @@ def _close(*envs: Any) -> None:
 
 @pytest.mark.parametrize(("mode", "threads"), [("NextStep", 1), ("SameStep", 2), ("Disabled", 2)])
 def test_bodies_and_rewards_may_differ(mode: str, threads: int, concluded: list[int]) -> None:
-    """Different envs are grouped, and ended episodes do not affect the others."""
+    """Envs of different kinds are computed in groups; an ended episode affects no other env."""
     kinds: list[dict[str, Any]] = [
         *({"body": body} for body in random_bodies(_ANT, 3)),
         {"healthy_reward": 0, "forward_reward_weight": 2, "ctrl_cost_weight": 3},
@@ -87,7 +90,7 @@ def test_bodies_and_rewards_may_differ(mode: str, threads: int, concluded: list[
 def test_precision_and_order_of_actions(
     kind: Any, order: Any, arguments: dict[str, Any], concluded: list[int]
 ) -> None:
-    """Costs are summed in the precision of the actions; observations may have other parts."""
+    """Costs are summed in the actions' precision, whichever parts the observations have."""
     ours, theirs = _pair([arguments] * 5)
     for envs in (ours, theirs):
         envs.reset(seed=0)
@@ -109,7 +112,7 @@ def _slower(model: Any) -> None:
 
 @pytest.mark.parametrize("edit", [_lighter, _slower])
 def test_an_edit_takes_effect_at_the_next_step(edit: Callable[[Any], None]) -> None:
-    """An edit of one env counts until it is undone."""
+    """Edits of one env's model affect only that env, until they are undone."""
     ours, theirs = _pair([{"terminate_when_unhealthy": False}] * 3, mode="Disabled")
     for envs in (ours, theirs):
         envs.reset(seed=0)

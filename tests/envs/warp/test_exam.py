@@ -1,4 +1,4 @@
-"""Worlds on a device do what CPU envs do, from the same states, within stated tolerances."""
+"""Envs on a device take the same steps as CPU envs, within stated tolerances."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_step_from_the_same_state_has_the_same_results(
         assert not truncated.any()
         for i, env in enumerate(alone):
             observation, reward, ended, _, info = env.step(actions[i])
-            # A world that has ended is observed at its next start.
+            # The observation of an ended episode is in `final_obs`; the env has restarted.
             assert apart(infos["final_obs"][i], observation) < tolerance(worlds)
             assert apart(rewards[i], reward) < REWARD_TOLERANCE
             assert bool(terminated[i]) == ended
@@ -64,7 +64,7 @@ def test_a_step_from_the_same_state_has_the_same_results(
 
 
 def test_starts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> None:
-    """A start state is feasible by the CPU env's rules, and observed and named as there."""
+    """Start states fit the CPU env's rules, with the same observations, layouts and infos."""
     worlds, alone = pair
     observations, infos = worlds.reset(seed=5)
     assert worlds.observation_layout == alone[0].observation_layout

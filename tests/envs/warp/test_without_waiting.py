@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 import shapechanger
 from shapechanger.morphology import Stretch
 from shapechanger.transfer.learners.rsl import RslVecEnv, _Returns  # pyright: ignore[reportPrivateUsage]
-from tests.envs.warp.pretended_device import pretended_device
+from tests.envs.warp.fake_device import fake_device
 
 LONG = [Stretch("*shank*", 1.2)]
 
@@ -28,7 +28,7 @@ def _actions(envs: Any, number: int) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("name", "questions", "copies", "arguments"),
+    ("name", "syncs", "copies", "arguments"),
     [
         ("Ant", 1, 0, {"bodies": ["Ant", "ExtendedAnt", LONG]}),
         ("Ant", 1, 0, {"pool": ["Ant", LONG]}),
@@ -37,19 +37,20 @@ def _actions(envs: Any, number: int) -> Any:
         ("InvertedDoublePendulum", 1, 0, {}),
         ("Humanoid", 1, 0, {}),
         ("Finger", 1, 0, {}),
-        # Its paths are functions of NumPy: which worlds started, their starts, and points.
+        # Paths are NumPy functions: two synchronisations read which worlds started and their
+        # starts, and a copy writes the points.
         ("FingerTrack", 2, 1, {}),
     ],
 )
 def test_a_step_does_not_wait(
     name: str,
-    questions: int,
+    syncs: int,
     copies: int,
     arguments: dict[str, Any],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Neither ends, restarts nor divergence add a question; no tensors of two devices meet."""
-    with pretended_device(monkeypatch) as device:
+    """Ends, restarts and divergence add no synchronisation; no call mixes two devices."""
+    with fake_device(monkeypatch) as device:
         envs = shapechanger.make_vec(name, 3, backend="warp", max_episode_steps=4, **arguments)
         envs.reset(seed=0)
         ended = 0
@@ -59,9 +60,9 @@ def test_a_step_does_not_wait(
                 envs.batches[0].qvel[0] = torch.nan
             device.forget()
             _, _, terminated, truncated, infos = envs.step(actions)
-            counted = dict(device.questions), dict(device.copies), dict(device.mixed)
+            counted = dict(device.syncs), dict(device.copies), dict(device.mixed)
             if name != "FingerTrack" or not bool((terminated | truncated).any()):
-                assert sum(counted[0].values()) == questions, counted
+                assert sum(counted[0].values()) == syncs, counted
                 assert sum(counted[1].values()) == copies, counted
             assert not any(counted[2].values()), counted
             assert bool(infos["diverged"][0]) == (number == 2)
@@ -70,9 +71,9 @@ def test_a_step_does_not_wait(
         envs.close()
 
 
-def test_a_learner_adds_no_question(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scaling rewards by the deviation of returns stays on the device."""
-    with pretended_device(monkeypatch) as device:
+def test_a_learner_adds_no_synchronisation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rewards are scaled by the standard deviation of returns on the device."""
+    with fake_device(monkeypatch) as device:
         envs = RslVecEnv(
             shapechanger.make_vec("Ant", 3, backend="warp", max_episode_steps=3, task_infos=False),
             seed=0,
@@ -85,6 +86,6 @@ def test_a_learner_adds_no_question(monkeypatch: pytest.MonkeyPatch) -> None:
             _, rewards, ends, _ = envs.step(actions)
             scaled = returns.scaled(rewards, ends)
             assert scaled.device.type == "cuda"
-            assert sum(device.questions.values()) == 1, device.questions
+            assert sum(device.syncs.values()) == 1, device.syncs
             assert not sum(device.copies.values()), device.copies
             assert not sum(device.mixed.values()), device.mixed

@@ -31,7 +31,7 @@ def test_children_beyond_a_cut_are_removed() -> None:
 def test_a_cut_leaves_something() -> None:
     spec = arm()
     spec.geom("lower").fromto = [0.3, 0.0, 0.0, 0.4, 0.0, 0.0]
-    with pytest.raises(MorphologyError, match=r"No geom of 'lower' lies nearer than 0\.5 of its"):
+    with pytest.raises(MorphologyError, match=r"No geom of 'lower' lies within 0\.5 of its"):
         built(spec, Cut("lower", 0.5))
 
 

@@ -60,7 +60,7 @@ _MOTORS = """
         '<inertial pos=".1 0 0" mass="2" diaginertia=".1 .2 .25"/><geom size=".1"/>',
     ],
 )
-def test_a_mass_can_be_set_for_any_form(content: str) -> None:
+def test_a_mass_can_be_set_for_geoms_and_for_an_inertial(content: str) -> None:
     before, after = built(limb(content)), built(limb(content), Mass("link", to=0.7))
     assert mass(after, "link") == pytest.approx(0.7)
     np.testing.assert_allclose(
@@ -118,7 +118,7 @@ def test_friction_has_three_coefficients(component: Any, place: int) -> None:
     ],
 )
 def test_gear_scales_the_force_of_any_actuator(actuator: str) -> None:
-    """In any state and for any control, so a servo keeps its targets."""
+    """The force scales in any state and for any control, so a servo keeps its targets."""
     spec = arm(f"<actuator>{actuator}</actuator>")
     old, new = built(spec), built(spec, Gear("a", scale=0.4))
     for seed in range(3):
@@ -135,7 +135,10 @@ def test_gear_scales_the_force_of_any_actuator(actuator: str) -> None:
 
 
 def test_a_largest_force_scales_with_all_of_its_motors() -> None:
-    """Else a stronger motor would change nothing; one of two does not change it."""
+    """The joint's force limit is scaled only if the edit scales every motor on the joint.
+
+    If the limit stayed, a stronger motor would have no effect.
+    """
     motors = '<actuator><motor name="a" joint="upper"/><motor name="b" joint="upper"/></actuator>'
     spec = arm(motors, joint='actuatorfrcrange="-2 2"')
     for pattern, largest in (("*", 6.0), ("a", 2.0)):

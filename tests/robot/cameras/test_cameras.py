@@ -51,7 +51,7 @@ def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
 
 
 def test_the_pattern_changes_and_carries_its_time() -> None:
-    """The barcode of each frame is its capture time, to measure its age anywhere."""
+    """The barcode of each frame is its capture time, so any receiver can measure its age."""
     camera = open_camera(CameraPlan("pattern", fps=100.0))
     frames = [camera.read() for _ in range(3)]
     for frame in frames:
@@ -122,7 +122,7 @@ def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
     old = simplejpeg.encode_jpeg(noise, 95)
     with fifo.open("wb", buffering=0) as writer:
         fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, 1 << 18)
-        count = 150_000 // len(old)  # More than one read returns.
+        count = 150_000 // len(old)  # Too long for a single read.
         writer.write(old * count + jpeg_of(90) + jpeg_of(20)[:100])
         assert camera.read().jpeg == jpeg_of(90)
         writer.write(jpeg_of(20)[100:])

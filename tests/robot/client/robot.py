@@ -66,16 +66,16 @@ class Robot:
     reward: dict[str, float] = field(default_factory=dict)
     version: int = m.VERSION
     clock: str = "twin"
-    silent: bool = False  # It sends nothing, on connections that stay open.
-    frozen: bool = False  # Its camera sends no new frame.
-    delay_s: float = 0.0  # Of each answer.
+    silent: bool = False  # Sends nothing, on connections that stay open.
+    frozen: bool = False  # The camera sends no new frame.
+    delay_s: float = 0.0  # Delay of each answer.
     garbage: bytes | None = None  # Sent instead of the next observation.
     jpeg: bytes | None = None  # Sent as each frame; None for frames that encode their number.
-    refusal: str = ""  # Of each command; "" to accept them.
+    refusal: str = ""  # Reason for which each command is refused; "" to accept commands.
     held_by: str = ""  # Another client in control.
     absent: tuple[str, ...] = ()  # Features of the state without a measurement.
-    arm_by_itself: bool = False  # When a client takes control.
-    home_at_take: bool = False  # It returns to its start then.
+    arm_by_itself: bool = False  # Arms when a client takes control.
+    home_at_take: bool = False  # Returns to its start when a client takes control.
     armed: bool = False
     emergency: bool = False
     stop_reason: str = ""
@@ -222,7 +222,7 @@ class Robot:
                     self.emergency, self.stop_reason = True, message.reason
                 case m.Arm():
                     if message.answers != self._seq:
-                        await self._send(socket, m.Refused(reason="You answer something old."))
+                        await self._send(socket, m.Refused(reason="The observation is too old."))
                     elif self.arming == "person" and hello.role != "person":
                         await self._send(socket, m.Refused(reason="Only a person arms this robot."))
                     else:

@@ -64,7 +64,7 @@ def only(folder: Path) -> Path:
 
 @pytest.mark.plan(deadline_ms=60_000)
 async def test_a_step_pairs_an_observation_and_its_command(robot: Running, tmp_path: Path) -> None:
-    """While the robot is armed, also after a change of control."""
+    """Steps are recorded while the robot is armed, also after a change of control."""
     async with robot.client(role="person", name="Grace") as person, robot.client() as program:
         await program.obtain()
         began = await recording(person)
@@ -119,7 +119,7 @@ async def test_only_persons_record_and_judge(robot: Running, tmp_path: Path) -> 
 async def test_a_failing_disk_ends_the_recording_and_not_the_drive(
     robot: Running, tmp_path: Path
 ) -> None:
-    """The next one is closed when the daemon ends."""
+    """A new recording can be started, and is closed when the daemon ends."""
     async with robot.client(role="person") as person:
         await robot.armed(person)
         await recording(person)
@@ -144,7 +144,7 @@ async def test_a_failing_disk_ends_the_recording_and_not_the_drive(
     assert (episode.closed, episode.outcome, len(episode.steps)) == (True, "", 4)
 
 
-async def test_recordings_cannot_share_a_folder_or_outlast_people(
+async def test_recordings_cannot_share_a_folder_and_end_with_the_last_person(
     robot: Running, tmp_path: Path
 ) -> None:
     async with robot.client() as program:

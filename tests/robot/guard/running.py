@@ -49,7 +49,10 @@ class Robot:
         return [line["t"] for line in self.record.lines() if "command" in line]
 
     def rested_ns(self, after_ns: int, pid: int | None = None) -> int:
-        """Wait until each pin went to rest after a time, set by process `pid`; return the last."""
+        """Wait until each pin rests after `after_ns`; return the time at which the last one did.
+
+        With `pid`, only changes that this process made count.
+        """
         found: dict[str, int] = {}
 
         def look() -> bool:

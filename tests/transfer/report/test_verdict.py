@@ -1,4 +1,4 @@
-"""The findings of a study: measures by hand, the verdict and its caveats."""
+"""The findings of a study: measures against hand computations, the verdict and its caveats."""
 
 from __future__ import annotations
 

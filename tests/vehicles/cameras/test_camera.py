@@ -44,7 +44,7 @@ def _model(colour: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_cameras_render_their_models_in_turn() -> None:
-    """The image shows the geom ahead of the camera, in a new array; models may change."""
+    """The image shows the geom ahead of the camera, in a new array, also of a new model."""
     cameras = [OnboardCamera((32, 16), "eye"), OnboardCamera((16, 16), "eye")]
     for colours, brightest in ((("1 0 0", "0 0 1"), (0, 2)), (("0 1 0", "1 0 0"), (1, 0))):
         models = [_model(colour) for colour in colours]
@@ -151,8 +151,8 @@ def _picture(height: int = 120, width: int = 160) -> Picture:
 
 @_ALL
 @pytest.mark.parametrize("size", [(120, 160), (33, 47), (1, 1), (1, 300), (300, 1), (1080, 1920)])
-def test_a_lens_is_a_function_of_image_and_seed(change: Corruption, size: tuple[int, int]) -> None:
-    """A lens keeps size and type, and does not change its input."""
+def test_a_corruption_depends_on_image_and_seed(change: Corruption, size: tuple[int, int]) -> None:
+    """The result has the size and type of the image, which is not changed."""
     before = _picture(*size)
     kept = before.copy()
     after = change(before, 3)

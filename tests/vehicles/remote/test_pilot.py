@@ -1,4 +1,4 @@
-"""Which policies may drive a robot, and a policy on board of a twin."""
+"""Which policies may drive a robot, and a policy that runs on a twin's computer."""
 
 import contextlib
 import os
@@ -160,7 +160,7 @@ def test_a_policy_drives_on_board(student: Path) -> None:
 @pytest.mark.realtime
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_policy_that_dies_or_hangs_stops_the_robot(student: Path, number: int) -> None:
-    """Without a person doing anything."""
+    """The robot stops without any action of a person."""
     with _served(student, "twin" if number == signal.SIGKILL else "real") as (robot, person):
         until(lambda: _moves(person))
         pid = _pilot(robot)

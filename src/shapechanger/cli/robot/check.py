@@ -42,14 +42,14 @@ class RobotCheck:
     """Move nothing: check the computer, the settings and the wires, and list the pins with their
     positions on the header."""
     leds: bool = False
-    """Check a bench of one Pi with LEDs instead of motors, light each of them, let faults happen,
-    and write a report to send."""
+    """Check a Raspberry Pi with LEDs instead of motors: light each LED, cause faults, and write a
+    report."""
     faults: bool = False
     """Inject every fault into the robot's twin, and judge by the ledger of its pins."""
     twin: bool = False
-    """Check the robot's twin, without any hardware; --faults does always."""
+    """Check the robot's twin, without any hardware; --faults always uses the twin."""
     port: int = _PORT
-    """Port that it will be served at."""
+    """Port at which the robot will be served."""
     credentials: Path | None = None
     """Folder of its key and certificate, if not the one that `init` made."""
     motors_off: bool = False
@@ -90,7 +90,7 @@ class RobotCheck:
             twin=on_twin,
             one_shot=self.one_shot,
             probe=self.probe,
-            # The driver that faults befall is a program.
+            # The client that drives during the faults is a program, not a person.
             arguments=("--arm-by-program",) if self.leds and not on_twin else (),
             pilot=_PILOT,
             ask=ask_person if asks else lambda _: None,
@@ -126,7 +126,7 @@ class RobotCheck:
         if len(asked) > 1:
             raise RobotError(f"Choose one of {' and '.join(f'--{level}' for level in asked)}.")
         level: Any = asked[0] if asked else "plain"
-        pins = "goes with none of --twin, --wiring, --leds and --faults"
+        pins = "cannot be combined with --twin, --wiring, --leds or --faults"
         drives_pins = level == "plain" and not self.twin
         has_supply = level in {"plain", "wiring"} and not self.twin
         for option, given, has, needs in (

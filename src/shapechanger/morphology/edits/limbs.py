@@ -1,7 +1,7 @@
 """Edits of the structure of a body: lock, drive and free joints; cut, remove, split and add limbs.
 
-A URDF file has no motors and is fixed to the world: `AddMotor` and `AddFreeJoint` make a robot of
-it that can be run.
+A URDF file has no motors and is fixed to the world: with `AddMotor` and `AddFreeJoint` it becomes a
+robot that can move.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _NARROWEST_RAD: Final = 1e-3
 # MuJoCo refuses bodies of almost no mass, so a limb that exists in part is never smaller than this
 # share of its full size, which is a millionth of its mass. A motor is never weaker than this share.
 _SMALLEST_PART: Final = 0.01
-# A geom that is divided this far from the axis of its segment lies on it, m.
+# Distance within which a geom counts as lying on the axis of its segment, m.
 _ON_THE_AXIS_M: Final = 1e-12
 # Fields of the resistance of a joint or tendon, and those that a hinge takes from another.
 _RESISTANCE: Final = ("armature", "damping", "stiffness", "frictionloss")
@@ -88,8 +88,8 @@ class AddMotor(Edit, frozen=True):
     """Add a motor to joints that have none, named after the joint, with controls from -1 to 1.
 
     Attributes:
-        joint: Name or glob of the joints; those of a glob that have a motor, that an equality
-            makes follow another joint, or that no single motor can move, are left as they are.
+        joint: Name or glob of the joints. A glob skips joints that have a motor, that follow
+            another joint through an equality, or that no single motor can move.
         gear: Torque, N·m, or force, N, for a control of 1; None for the largest that the model
             allows the joint (`effort` in URDF, `actuatorfrcrange` in MJCF).
     """
@@ -139,7 +139,7 @@ def _add_motor(spec: mujoco.MjSpec, name: str, gear: float) -> None:
 
 
 class AddFreeJoint(Edit, frozen=True):
-    """Set a body that is fixed to the world free, with everything attached to it.
+    """Free a body that is fixed to the world, with everything attached to it.
 
     Attributes:
         body: Name of a body on the world that has no joint.
@@ -163,8 +163,8 @@ class AddFreeJoint(Edit, frozen=True):
 class Cut(Edit, frozen=True):
     """Cut a limb: shorten a segment, and remove what is attached to it beyond the cut.
 
-    The nearer part is unchanged, and geoms that the cut crosses become shorter. Sites, pins
-    of loops, cameras and lights at the far end or past it mark the end, and move to the new one.
+    The nearer part is unchanged, and geoms that the cut crosses become shorter. Sites, pins of
+    loops, cameras and lights at or beyond the far end of the segment move to the new end.
 
     Attributes:
         body: Name or glob of the segments; not a trunk.
@@ -201,7 +201,7 @@ class Cut(Edit, frozen=True):
         pieces = [(geom, plane.piece_of(geom)) for geom in body.geoms]
         if not any(piece.share for _, piece in pieces):
             raise MorphologyError(
-                f"No geom of {body.name!r} lies nearer than {self.keep:g} of its length, so "
+                f"No geom of {body.name!r} lies within {self.keep:g} of its length, so "
                 "nothing would be left of it: keep more."
             )
         for geom, piece in pieces:
@@ -244,10 +244,9 @@ def _check_hinge(edit: Split | AddSegment) -> None:
 class Split(Edit, frozen=True):
     """Split a segment in two, with a hinge where it was split.
 
-    The nearer part keeps the body's name and joint. Elements on one side of the plane of the
-    split are not divided and go to that part, spheres and ellipsoids by their middle; geoms that
-    the plane cuts are divided. The new hinge has the armature, damping and stiffness of the body's
-    own joint.
+    The nearer part keeps the body's name and joint. Geoms that the plane of the split cuts are
+    divided; all other elements go to the part on their side, spheres and ellipsoids by their
+    middle. The new hinge has the armature, damping and stiffness of the body's own joint.
 
     Attributes:
         body: Name of the segment; not a trunk.

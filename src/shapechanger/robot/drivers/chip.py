@@ -2,7 +2,7 @@
 
 The module of a chip has its keys in a profile, its driver and its simulation, and a `SensorChip`,
 `OutputChip` or `PulseSource` that names them. Other packages add chips by entry points of the group
-`shapechanger.drivers`, named as the driver in a profile.
+`shapechanger.drivers`, whose names are the drivers in a profile.
 """
 
 from __future__ import annotations
@@ -221,7 +221,8 @@ class SensorDriver(Protocol):
 class PulseChannel:
     """Source of the pulses of one servo, in whole microseconds, sent only when they change.
 
-    A subclass defines `_pulse`, or overrides `write_us` and `release` if it has other steps.
+    A subclass defines `_pulse`, or overrides `write_us` and `release` if its pulses are not whole
+    microseconds.
     """
 
     _width_us: int | None = None
@@ -257,10 +258,10 @@ class SensorChip:
         measures: Its quantities; see `SensorPlan.measures`.
         keys: Its keys in a profile, in addition to `driver`.
         open: Opens its driver.
-        simulate: Its simulation; None if a twin uses the real one, such as a file.
+        simulate: Its simulation; None if a twin reads the real sensor, such as a file.
         features: Features of a state that it alone measures; None if `measures` determines them.
-        rows: Keys of each nested table, such as a joint's; None without any. `keys` has them
-            as `rows`, keyed by name.
+        rows: Keys of each nested table, such as the table of a joint; None if the sensor has no
+            nested tables. They are decoded into the field `rows` of `keys`, keyed by table name.
     """
 
     measures: str
@@ -287,8 +288,8 @@ class OutputChip:
     Attributes:
         keys: Its keys in a profile, in addition to the keys of all outputs and of its pulse source.
         open: Opens its driver.
-        wire: Its wiring on a twin, which reads its state from the levels of the board's outputs;
-            called with the output, its value at rest, and the duty of a pin.
+        wire: Called with the output, its value at rest, and a function for the duty of a pin;
+            returns a function that reads the state of the output from a twin's levels.
         unpowered: State without power, if power goes through the one-shot of the enable line, as
             it does for motors; None for a steering servo or a joint.
         obeys: Creates a stateful function from the value of the pulses to the value of the motor;

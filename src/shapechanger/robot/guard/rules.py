@@ -1,6 +1,6 @@
 """Safety rules: whether and how the outputs move, as a function of time.
 
-The rules use no pins, sockets or clocks, so that they can be tested at any time. The guard process
+The rules use no pins, sockets or clocks, so that tests can pass in any time. The guard process
 (`shapechanger.robot.guard.process`) passes in orders and sensor readings, and writes the decisions
 of `Rules.tick`.
 """
@@ -71,7 +71,7 @@ class RobotHealth:
         return " ".join(filter(None, (*self._others, self._battery)))
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
-        """Update with a new sensing."""
+        """Update with new sensor readings."""
         failing: list[str] = []
         for name, why in sensing.failures.items():
             if name in sensing.slow:  # A slow sensor delays every stop, even without a reflex.
@@ -158,7 +158,8 @@ class OutputDecision:
 class Rules:
     """Safety rules of one robot.
 
-    The robot starts disarmed. An emergency stop latches until a person who has seen it arms.
+    The robot starts disarmed. An emergency stop latches until a person who has seen it arms the
+    robot again.
 
     Attributes:
         armed: Whether commands move anything.
@@ -312,8 +313,8 @@ class Rules:
     def _offer_command(self, order: Order, now_ns: int) -> str:
         """Accept a command, or return why it is refused.
 
-        Older commands than the newest one are refused even if that was refused, because their
-        sender has superseded them.
+        A command that is older than the newest one is refused even if the newest one was refused,
+        because the sender has superseded it.
         """
         limit_ms = min(self._plan.limits.deadline_ms, order.ttl_ms)
         expiry_ns = min(order.issued_ns, now_ns) + limit_ms * _NS_PER_MS

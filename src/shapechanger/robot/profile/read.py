@@ -111,10 +111,10 @@ DRIVERS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
     "sensor": {"driver": SENSORS},
     "camera": {"driver": CAMERAS},
 }
-"""Chips that a key of a table chooses from; their keys are keys of the table."""
+"""Chips among which a key of a table selects. The table then also has the keys of that chip."""
 
 GIVEN: Final = ("name", "measures", "settings", "rows")
-"""Fields of `TABLES` and of chips that are derived instead of being keys of a table."""
+"""Fields of `TABLES` and of chips that a table cannot set, because they are derived."""
 
 
 def read_profile(text: str, path: Path) -> Profile:

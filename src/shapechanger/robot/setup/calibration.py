@@ -59,7 +59,8 @@ def motor_changes(
 ) -> dict[str, Any]:
     """Return the changes for a motor, keyed by dotted name.
 
-    At a forward command it turned in the direction `went`, from a duty of `starts_at`, 0 to 1.
+    With a forward command the motor turned in the direction `went`, and it started to turn at a
+    duty of `starts_at`, 0 to 1.
     """
     full: float = output.settings["full"]
     if not 0.0 <= starts_at < full:
@@ -134,10 +135,10 @@ def require_homing(settings: BusSettings) -> None:
 
 
 def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
-    """Pull all tendons of a held bus until all servos stand still, in a known posture.
+    """Pull all tendons until all servos stand still; the finger must be in a known posture.
 
-    Slack tendons are taken up meanwhile. `cycle` sends the requested tensions, runs a cycle, and
-    returns its time, ns.
+    This also takes up slack. The servos must have been enabled by `ServoBus.hold`. `cycle` sends
+    the requested tensions, runs a cycle, and returns its time, ns.
 
     Returns:
         Position of each servo at the zero of its tendon, in counts, keyed by name.

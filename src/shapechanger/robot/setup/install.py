@@ -1,7 +1,7 @@
 """Install a robot on a Raspberry Pi: its service, its user's groups and its interfaces.
 
-Every change is checked before, so a second run has no effect, and afterwards, so that commands
-without an effect are reported. Commands run as root, by one function that tests replace.
+Every change is checked before it is made, so a second run has no effect, and afterwards, so that
+commands without an effect are reported. Commands run as root, by one function that tests replace.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def run_as_root(command: RootCommand) -> str:
 
 
 def _root(command: str, *more: object, text: str = "") -> RootCommand:
-    """Return a command from words and from arguments that may have blanks, with its input."""
+    """Return a command of words separated by blanks, more arguments in full, and its input."""
     return RootCommand((*command.split(), *map(str, more)), text)
 
 
@@ -171,8 +171,8 @@ class Machine:
     def settings(self) -> dict[str, str]:
         """Return the settings in config.txt that apply to every model, without filtered ones.
 
-        Parameters of the device tree are keyed as "dtparam.i2c", with "on" if a line only names
-        one, and overlays as "dtoverlay.imx219".
+        Parameters of the device tree have keys such as "dtparam.i2c", and the value "on" if the
+        line gives none; overlays have keys such as "dtoverlay.imx219".
         """
         found: dict[str, str] = {}
         section = "all"
@@ -280,9 +280,9 @@ def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
 
 
 def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterator[SystemChange]:
-    """Yield what puts a robot in place, whose systemd unit is next to its profile.
+    """Yield the changes that install a robot whose systemd unit is next to its profile.
 
-    Each change is planned when those before are made.
+    Each change is planned after the previous ones have been made.
     """
     groups = {*device_groups(profile).values(), *(["video"] if profile.camera else [])}
     yield from (_group(group, machine) for group in sorted(groups))
@@ -333,7 +333,7 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
         return SystemChange(name, state, is_made, commands, otherwise, restarts=True)
 
     if needs_pins(profile):
-        state = "The pins of a process that dies go low."
+        state = "The pins of a process go low when it dies."
         is_strict = partial(machine.sets, "strict_gpiod")
         yield line("strict_gpiod", state, "dtparam=strict_gpiod", is_strict)
     for device in (name for name, group in device_groups(profile).items() if group == "i2c"):
@@ -345,7 +345,7 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
             yield line("I2C", state, "dtparam=i2c_arm=on", is_on, module)
         else:
             exists = (machine.root / device.lstrip("/")).exists
-            reason = f"Bus {bus} needs an overlay that depends on its pins, as dtoverlay=i2c{bus}."
+            reason = f"Bus {bus} needs an overlay for its pins, such as dtoverlay=i2c{bus}."
             yield SystemChange(f"I2C bus {bus}", state, exists, instead=reason)
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
         state, text = f"The I2C bus has {_FAST_HZ} bits per second.", f"i2c_arm_baudrate={_FAST_HZ}"
@@ -364,7 +364,7 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
         else:
             yield SystemChange(
                 "latency timer",
-                "USB adapters that are plugged in from now on pass on answers within 1 ms.",
+                "USB adapters deliver answers within 1 ms, once they are plugged in again.",
                 lambda: _text(rule) == _LATENCY,
                 (_root("tee", rule, text=_LATENCY), _root("udevadm control --reload")),
             )

@@ -1,4 +1,7 @@
-"""Envs observed as rows of a trunk and its limbs, and the learner that trains in them."""
+"""Envs whose observations are rows, one for the trunk and one per limb, and their learner.
+
+See `shapechanger.transfer.limbs.rows` for the rows.
+"""
 
 from __future__ import annotations
 
@@ -24,14 +27,14 @@ from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns, row
 
 
 class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
-    """An env that is observed and moved by rows of its limbs.
+    """An env whose observations are rows of numbers, and whose actions are one number per limb.
 
     Args:
         env: An env that describes its kinematic tree.
         room: Limbs to have rows for; 0 for as many as the body has.
 
     Attributes:
-        rows: The map between the body's own numbers and the rows.
+        rows: Map from the env's observations to rows, and from limbs' actions to the env's.
         observation_layout: Meaning of each number of the rows.
         action_layout: Meaning of each action, from -1 to 1.
 
@@ -84,7 +87,7 @@ def limb_spaces(rows: LimbRows) -> tuple[gym.spaces.Box, gym.spaces.Box]:
 
 
 def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]:
-    """Return envs as rows, all of the same spaces."""
+    """Return `count` envs with rows, which take the bodies in turn and have the same spaces."""
     bodies = each_body(env)
     # Room for all bodies, even if there are fewer envs.
     room = rows_of_each(bodies, room)[0].room
@@ -92,7 +95,7 @@ def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]
 
 
 def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
-    """Return an env as a policy of limbs senses it."""
+    """Wrap an env for a policy of limbs; the env's rows must have the columns of `rows`."""
     limbs = LimbEnv(env, room)
     name = env.spec.id if env.spec else type(env.unwrapped).__name__
     require_same_columns(rows, limbs.observation_layout, name)
@@ -100,7 +103,7 @@ def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
 
 
 class LimbVecEnv(DummyVecEnv):
-    """Many envs of different bodies, also with different numbers of limbs, as rows.
+    """Many envs with rows, of bodies that may differ in their number of limbs.
 
     Envs whose spaces agree are stepped together.
 
@@ -132,7 +135,7 @@ class LimbVecEnv(DummyVecEnv):
             self._groups.append((numbers, LimbRows.stacked([own[i] for i in numbers]), envs))
             for i, one in zip(numbers, envs.envs, strict=True):
                 self.envs[i] = one
-        # Skips DummyVecEnv's, which would make its own envs and buffers.
+        # Skips the constructor of DummyVecEnv, which would make its own envs and buffers.
         cast("Any", VecEnv).__init__(self, num_envs, *limb_spaces(own[0]))
         self._actions = np.zeros((num_envs, own[0].room), np.float32)
 
@@ -191,7 +194,7 @@ def bodies_in_turn(
 
 
 def together(bodies: Sequence[EnvRef]) -> EnvRef:
-    """Return envs of different bodies as the one that `shapechanger.make_vec` makes of them."""
+    """Combine envs that differ in their body into one, with the argument `bodies`."""
     first = bodies[0]
     kwargs = {name: value for name, value in first.kwargs.items() if name != "body"}
     if "body" in first.kwargs:
@@ -225,7 +228,7 @@ class LimbLearner(Sb3Learner):
         rows_of_each(each_body(env), self.settings.room)
 
     def evaluation_envs(self, env: EnvRef) -> list[gym.Env[Any, Any]]:
-        """Make envs as rows, which have the bodies in turn."""
+        """Make envs with rows, which take the bodies in turn."""
         return limb_envs(env, self.settings.eval_episodes, self.settings.room)
 
     def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:

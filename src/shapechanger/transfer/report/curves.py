@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from shapechanger.transfer.study import Study
 
-# An interval of two seeds may reach ten times as far as they lie apart.
+# Fewest seeds with a band: an interval of two seeds is over ten times as wide as their difference.
 _BAND_SEEDS: Final = 3
 
 Counting = Literal["target", "total"]
@@ -171,9 +171,13 @@ def _return_limits(study: Study) -> tuple[float, float]:
 
 
 def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
-    """Plot the end of each arm over a number in which the targets of several studies differ.
+    """Plot the final value of each arm against a property of the target, one study per value.
 
     A point is one seed; a line joins the means over seeds.
+
+    Args:
+        studies: Studies that differ in the target only, keyed by the property's value.
+        xlabel: Name of the property.
     """
     first = next(iter(studies.values()))
 

@@ -62,7 +62,7 @@ _VOID = TrialResult(0.0, 270.0, False)
         ([RobotError("The driver did not drive.")], "bad", "The driver did not drive."),
         ([_result(math.nan, answer=True)], "good", "The LEDs were lit, and then out."),
         ([_result(math.nan, answer=False)], "bad", "NOT lit, or NOT out afterwards."),
-        ([_result(math.nan)], "unknown", "Not measured: a wire to a free pin does, with --probe"),
+        ([_result(math.nan)], "unknown", "Not measured: join the motor's pin to a free"),
     ],
 )
 def test_a_fault_is_a_check(

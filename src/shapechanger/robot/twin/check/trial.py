@@ -114,7 +114,7 @@ class Bench:
     profile: Profile
     _: KW_ONLY
     twin: bool = True  # Whether on its twin.
-    one_shot: bool = True  # Whether a twin has the one-shot of the enable line, as the profile.
+    one_shot: bool = True  # Whether a twin has the profile's one-shot of the enable line.
     probe: int | None = None  # Free BCM pin, wired to the pin of the motor that drives forward.
     arguments: tuple[str, ...] = ()  # Further arguments of `serve`.
     pilot: str = ""  # Module of the program that drives as a policy on board; see `Driver`.
@@ -183,14 +183,15 @@ class Bench:
             "camera": profile.camera is not None,
             "bumper": any(sensor.measures == "bump" for sensor in profile.sensors),
             "button": profile.stop_pin is not None,
-            # Tried on pins even without the part, because it shows the effect of its absence.
+            # On real pins this fault is tried even without a one-shot, to show its effect then.
             "one-shot": profile.enable_pin is not None or not self.twin,
             "throttle": any(one.name == "throttle" and one.propels for one in profile.actions),
         }
         return "" if has.get(need, True) else f"This robot has no {need}."
 
 
-# A supervisor gives up after five restarts within a minute, which would count as a success.
+# A supervisor gives up after five restarts within a minute. The robot would then be at rest, and
+# the trial would wrongly count as a success.
 _MOST_RESTARTS: Final = 4
 # A busy machine can make a robot restart, or pause while a fault is made.
 _ATTEMPTS: Final = 10
@@ -225,10 +226,10 @@ class TrialResult:
 
 
 def run_trials(bench: Bench, fault: Fault, trials: int) -> Iterator[TrialResult]:
-    """Drive, let a fault happen, and judge, until the robot drove in as many trials as asked.
+    """Drive, cause the fault and judge, until the robot has driven in as many trials as requested.
 
-    Thrice as many are made at most. A robot that cannot be driven, because a busy machine made it
-    restart, is replaced first; so is one whose fault has an unknown time.
+    At most three times as many are made. The robot is replaced if it cannot be driven, because a
+    busy machine made it restart, or if the time of its fault is unknown.
     """
     drove = tried = not_tried = 0
     while drove < trials and tried < _TRIES * trials:
@@ -338,8 +339,8 @@ def _judged(
     """Judge a trial on a twin by its ledger."""
     profile, ledger = bench.profile, read_ledger(bench.board.ledger_path)
     if fault.needs in {"camera", "bumper", "button"}:
-        # The fault begins with its line in the ledger, or with the edge of a switch. The time until
-        # then is not the robot's.
+        # The fault begins with its line in the ledger, or with the edge of a switch. The robot's
+        # time to stop is measured from there.
         switches = [one.settings["pins"] for one in profile.sensors if one.driver == "switch"]
         pins = [profile.stop_pin, *(pin for pins in switches for pin in pins)]
         begins = {("fault", None)} if fault.needs == "camera" else {("input", pin) for pin in pins}
@@ -366,7 +367,7 @@ def fault_finding(bench: Bench, fault: Fault, trials: int) -> tuple[Level, str]:
     try:
         tried = list(run_trials(bench, fault, trials))
     except ShapechangerError as error:
-        # The next robot begins at rest.
+        # The next trial must begin with a robot at rest.
         return "bad", " ".join([str(error), *bench.close()])
     results = [result for result in tried if result.drove or result.unauthorised]
     if len(results) < trials or not all(result.drove for result in results):
@@ -384,7 +385,8 @@ def fault_finding(bench: Bench, fault: Fault, trials: int) -> tuple[Level, str]:
         return judged(good, f"At rest {stopped}; {promised}.{moved}")
     answers = {result.answer for result in results}
     if answers == {None}:
-        return "unknown", f"Not measured: a wire to a free pin does, with --probe; {promised}."
+        how = "Not measured: join the motor's pin to a free pin, and give --probe"
+        return "unknown", f"{how}; {promised}."
     otherwise = "NOT lit, or NOT out afterwards."
     return judged(answers == {True}, "The LEDs were lit, and then out.", otherwise)
 
@@ -411,7 +413,9 @@ def require_level(level: CheckLevel, bench: Bench) -> None:
 def check_robot(
     level: CheckLevel, bench: Bench, standing: StandingRobot, *, cap: float, trials: int = 1
 ) -> Iterator[tuple[str, Iterator[Finding]]]:
-    """Yield each part of a level, and its findings, before its first question.
+    """Yield the name of each part of a level with an iterator of its findings.
+
+    A part runs, and asks its questions, as its iterator is read.
 
     Nothing moves in the part "wiring"; all others drive outputs. Each ends at rest. `cap`, 0 to 1,
     is the largest throttle of "driving", and `trials` the number of trials of each fault.

@@ -1,8 +1,8 @@
-"""A device "cuda:0" that is pretended on the CPU, and counts questions and copies.
+"""A fake device "cuda:0" on the CPU, which counts synchronisations and copies.
 
-Tensors made there are tensors of the CPU with a mark, and what is computed from them has the mark
-too. So mixtures of devices, NumPy on a tensor of a device, questions that make the CPU wait for the
-device, and copies to the device are found on a machine without a GPU.
+Its tensors are CPU tensors with a mark, and so are the results of computations with them. On a
+machine without a GPU this finds operations that mix devices or pass a device tensor to NumPy,
+synchronisations (the CPU waits for the device), and copies to the device.
 """
 
 # Torch functions take and return anything.
@@ -27,7 +27,7 @@ from shapechanger.envs.warp.devices import wp
 
 _CPU = torch.device("cpu")
 _DEVICE = torch.device("cuda:0")
-_QUESTIONS = frozenset(
+_SYNCS = frozenset(
     [
         *("item", "tolist", "__bool__", "__float__", "__int__", "__index__", "nonzero", "equal"),
         *("allclose", "unique", "masked_select"),
@@ -36,36 +36,36 @@ _QUESTIONS = frozenset(
 _TO_NUMPY = frozenset({"numpy", "__array__"})
 _MAKES = frozenset({"to", "as_tensor", "tensor", "asarray"})
 _READS = frozenset({"__setitem__", "index_put_", "index_put", "__getitem__"})
-# Functions that take tensors of two devices, or tell nothing of one.
+# Functions that accept tensors of two devices, or do not read a tensor's numbers.
 _FREE = frozenset(
     ["copy_", "__repr__", "__format__", "__hash__", "__len__", "size", "dim", "as_tensor"]
 )
 
 
 def _marked(value: Any) -> bool:
-    return isinstance(value, torch.Tensor) and value.__dict__.get("_pretended", False)
+    return isinstance(value, torch.Tensor) and value.__dict__.get("_fake", False)
 
 
 def _mark(value: Any) -> Any:
     for tensor in tree_leaves(value):
         if isinstance(tensor, torch.Tensor):
-            tensor._pretended = True  # pyright: ignore[reportAttributeAccessIssue]
+            tensor._fake = True  # pyright: ignore[reportAttributeAccessIssue]
     return value
 
 
 def _line() -> str:
-    """Return the file and line of ours that called torch."""
+    """Return the file and line in Shapechanger that called torch."""
     ours = [f for f in traceback.extract_stack() if "/shapechanger/" in f.filename]
     return f"{ours[-1].filename.rpartition('/')[2]}:{ours[-1].lineno}" if ours else "a test"
 
 
-class PretendedDevice(TorchFunctionMode):
-    """Counts what a GPU would wait for.
+class FakeDevice(TorchFunctionMode):
+    """Counts the calls that would be slow or fail on a GPU, keyed by their place in the code.
 
     Attributes:
-        questions: Places where the CPU waits for an answer of the device.
-        copies: Places that copy to the device.
-        mixed: Places that mix tensors of two devices, which fails on a GPU.
+        syncs: Calls in which the CPU waits for a result of the device.
+        copies: Calls that copy to the device.
+        mixed: Calls that mix tensors of two devices, which fails on a GPU.
     """
 
     def __init__(self) -> None:
@@ -74,12 +74,12 @@ class PretendedDevice(TorchFunctionMode):
 
     def forget(self) -> None:
         """Start counting from zero."""
-        self.questions: Counter[str] = Counter()
+        self.syncs: Counter[str] = Counter()
         self.copies: Counter[str] = Counter()
         self.mixed: Counter[str] = Counter()
 
     def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
-        """Call a function of torch, and note what a GPU would do."""
+        """Call a function of torch, and count what it would cost on a GPU."""
         kwargs = dict(kwargs or {})
         name = getattr(func, "__name__", "")
         if name == "__get__":
@@ -119,12 +119,12 @@ class PretendedDevice(TorchFunctionMode):
         return _mark(result) if _marked(args[0]) else result
 
     def _note(self, name: str, args: Any, tensors: Any, there: Any, target: bool | None) -> None:
-        if there and (name in _QUESTIONS or target is False):
-            self.questions[f"{name} at {_line()}"] += 1
+        if there and (name in _SYNCS or target is False):
+            self.syncs[f"{name} at {_line()}"] += 1
         if target and name in _MAKES and len(there) < max(1, len(tensors)):
             self.copies[f"{name} at {_line()}"] += 1
         if name == "copy_" and there and len(there) != len(tensors):
-            counter = self.copies if _marked(args[0]) else self.questions
+            counter = self.copies if _marked(args[0]) else self.syncs
             counter[f"copy_ at {_line()}"] += 1
         if name in _READS and there:
             self._note_index(name, args)
@@ -140,7 +140,7 @@ class PretendedDevice(TorchFunctionMode):
         for index in indices:
             if isinstance(index, torch.Tensor):
                 if index.dtype == torch.bool:
-                    self.questions[f"a mask in {name} at {_line()}"] += 1
+                    self.syncs[f"a mask in {name} at {_line()}"] += 1
                 elif not _marked(index) and index.dim() > 0:
                     self.copies[f"an index of {name} at {_line()}"] += 1
             elif not isinstance(index, int | slice | type(None) | type(...)):
@@ -151,8 +151,8 @@ class PretendedDevice(TorchFunctionMode):
 
 
 @contextlib.contextmanager
-def pretended_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[PretendedDevice]:
-    """Let envs be made on "cuda:0", which Warp's CPU device computes."""
+def fake_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeDevice]:
+    """Let envs be made on the fake "cuda:0", which Warp's CPU device computes."""
 
     @contextlib.contextmanager
     def on(device: str) -> Iterator[None]:
@@ -164,7 +164,7 @@ def pretended_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[PretendedDevic
             return devices.as_warp(tensor, dtype)
 
     def run(self: Any, name: str, function: Any) -> None:
-        """Leave the physics out, which asks and copies nothing."""
+        """Skip the physics, which neither synchronises nor copies."""
 
     monkeypatch.setattr(warp, "find_device", lambda name: "cuda:0")
     monkeypatch.setattr(worlds, "on", on)
@@ -174,5 +174,5 @@ def pretended_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[PretendedDevic
     monkeypatch.setattr(worlds, "as_torch", lambda array: _mark(devices.as_torch(array)))
     monkeypatch.setattr(kernels, "as_warp", as_warp)
     monkeypatch.setattr(worlds.Worlds, "_run", run)
-    with PretendedDevice() as device:
+    with FakeDevice() as device:
         yield device
