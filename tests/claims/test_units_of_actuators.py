@@ -45,7 +45,7 @@ def test_a_hoist_learns_alike_in_newtons(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_hoist_of_30_newtons_learns(tmp_path: Path) -> None:
-    """So it does with a range of -1 to 1, from the same start.
+    """A hoist with a range of ±30 N learns like one with a range of ±1, from the same start.
 
     A factor of 30 rounds, and after 32,768 steps roundings have become another training: the
     returns were -66 and -286 with the same seed.

@@ -326,7 +326,7 @@ class FakeHub(ThreadingHTTPServer):
 
     @property
     def address(self) -> str:
-        """Its URL, for HF_ENDPOINT."""
+        """URL of the fake Hub, for HF_ENDPOINT."""
         return f"http://127.0.0.1:{self.server_address[1]}"
 
 

@@ -208,7 +208,7 @@ def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_it_is_trained_in_drawn_bodies(policy: Path) -> None:
+def test_a_policy_is_trained_in_drawn_bodies(policy: Path) -> None:
     """The card names the bodies, and belongs to a policy of limbs."""
     card = load_policy(policy).card
     assert card.env.kwargs == {"bodies": {"split": "train", "count": 3, "seed": 0}}
@@ -216,7 +216,7 @@ def test_it_is_trained_in_drawn_bodies(policy: Path) -> None:
 
 
 @pytest.mark.slow
-def test_it_is_trained_on_a_device(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_policy_is_trained_on_a_gpu(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In many bodies `rsl-ppo` has the network of limbs; the policy acts in a body it never had."""
     out = tmp_path / "ants.safetensors"
     of_two = ["train", "Ant", "--bodies", "2", "--learner", "rsl-ppo", "--steps", "48"]
@@ -228,7 +228,7 @@ def test_it_is_trained_on_a_device(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "forward speed" in capsys.readouterr().out
 
 
-def test_it_is_evaluated_in_any_body(policy: Path, cli: Cli) -> None:
+def test_a_policy_is_evaluated_in_any_body(policy: Path, cli: Cli) -> None:
     """Without a body in the family's own, otherwise in the named one, without a body map."""
     evaluate = ("policies", "evaluate", policy, "--episodes", "1")
     own, other = cli.output(*evaluate), cli.output(*evaluate, "--env", "ExtendedAnt")
@@ -239,7 +239,7 @@ def test_it_is_evaluated_in_any_body(policy: Path, cli: Cli) -> None:
 
 
 @pytest.mark.slow
-def test_it_is_exported_for_one_body(policy: Path, tmp_path: Path) -> None:
+def test_a_policy_is_exported_for_one_body(policy: Path, tmp_path: Path) -> None:
     out = tmp_path / "ant.onnx"
     main(["policies", "export", str(policy), "--env", "ExtendedAnt", "--out", str(out)])
     card = load_policy(out).card

@@ -59,7 +59,7 @@ def _bodies(env: Any) -> list[str]:
 
 
 def test_inertias_are_about_the_centre_of_mass(humanoid: Any) -> None:
-    """They follow from the parallel axis theorem, in the world's axes."""
+    """Inertias follow from the parallel axis theorem, in the world's axes."""
     sensed, centre = _sensed(humanoid), humanoid.data.subtree_com[1]
     for name in _bodies(humanoid):
         body, model = humanoid.data.body(name), humanoid.model.body(name)
@@ -78,7 +78,7 @@ def test_inertias_are_about_the_centre_of_mass(humanoid: Any) -> None:
 
 
 def test_twists_are_velocities_at_the_centre_of_mass(humanoid: Any) -> None:
-    """They equal MuJoCo's body velocities, moved to the centre of mass."""
+    """Twists equal MuJoCo's body velocities, moved to the centre of mass."""
     sensed, centre, six = _sensed(humanoid), humanoid.data.subtree_com[1], np.zeros(6)
     for name in _bodies(humanoid):
         body, kind = humanoid.data.body(name), mujoco.mjtObj.mjOBJ_XBODY

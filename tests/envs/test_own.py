@@ -119,8 +119,8 @@ def test_without_a_home_joints_start_inside_their_limits(dog: Path) -> None:
     np.testing.assert_array_equal(_inner(env).data.qpos[7:], [0.0, 0.0])
 
 
-def test_a_task_of_ones_own(dog: Path) -> None:
-    """It names what it observes, ends episodes, and has options and measures."""
+def test_a_custom_task(dog: Path) -> None:
+    """A custom task names its observations, ends episodes, and has options and measures."""
     env = shapechanger.from_mjcf(dog, Rear, task_options={"weight": 2.0})
     inner = _inner(env)
     assert inner.observation_layout.names[-1] == "front/contact/fz"
@@ -166,7 +166,7 @@ def test_an_up_axis_is_that_of_the_start(tmp_path: Path) -> None:
 
 
 def test_a_diverging_simulation_is_reported(dog: Path) -> None:
-    """It ends the episode without a reward, and is not blamed on the task."""
+    """Divergence ends the episode with a reward of 0, and no error of the task is reported."""
     env = shapechanger.from_mjcf(dog, Nonsense())
     env.reset(seed=0)
     _inner(env).data.qvel[:] = 1e12
@@ -211,7 +211,7 @@ def test_bodies_change_at_a_reset(dog: Path) -> None:
 
 
 def test_certificates_name_the_files(dog: Path, tmp_path: Path) -> None:
-    """And what differs between two bodies, or between two files."""
+    """A certificate names the files, and the differences between two bodies or two files."""
     one = shapechanger.from_mjcf(dog)
     other = shapechanger.from_mjcf(dog, body=Stretch("front", 1.5))
     text = str(_inner(one).certify_shift(one, other))

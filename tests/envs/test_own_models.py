@@ -33,7 +33,7 @@ def _written(folder: Path, name: str, text: str) -> Path:
 
 
 def test_a_file_is_a_family(tmp_path: Path) -> None:
-    """Its only named body is the file's own; edits make others."""
+    """The only named body of the family is the file's; edits make others."""
     path = _written(tmp_path, "leg.xml", LEG)
     family = own_family(path)
     assert (family.name, family.body("leg")) == ("leg", ())

@@ -151,7 +151,7 @@ def test_coupled_fingers_start_coupled_and_stay_without_motors(tmp_path: Path) -
 
 
 def test_a_base_that_slides_in_a_plane_can_walk(tmp_path: Path) -> None:
-    """It cannot fall, so the task needs no floor; a box before it in the file is no trunk."""
+    """The task needs no floor, and a box earlier in the file is not taken for the trunk."""
     box = '<body name="box" pos="1 0 .1"><freejoint/><geom size=".1"/></body>'
     text = f"""
     <mujoco><worldbody>{box}

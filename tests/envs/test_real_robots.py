@@ -159,7 +159,7 @@ def test_a_file_that_is_no_robot_says_why(path: str, sentence: str) -> None:
 
 
 @each_robot
-def test_it_starts_closed_and_steps(robot: _Robot) -> None:
+def test_a_robot_starts_with_closed_loops_and_steps(robot: _Robot) -> None:
     """Inside its limits, with equalities as closed as in the file; random actions move it."""
     env = robot.make()
     inner: Any = env.unwrapped
@@ -179,7 +179,7 @@ def test_it_starts_closed_and_steps(robot: _Robot) -> None:
 
 
 @each_robot
-def test_it_grows_alike_or_refuses(robot: _Robot) -> None:
+def test_a_robot_is_scaled_or_refused(robot: _Robot) -> None:
     """Lengths grow by the factor and masses by its cube; equalities stay closed."""
     body = (Stretch("*", _BIG), Radius("*", _BIG))
     if robot.no_scale:
@@ -201,7 +201,7 @@ def test_it_grows_alike_or_refuses(robot: _Robot) -> None:
 
 
 @each_robot
-def test_its_shift_is_certified(robot: _Robot) -> None:
+def test_the_shift_of_a_robot_is_certified(robot: _Robot) -> None:
     """A change of all masses counts, no edit does not."""
     source, target = robot.make(), robot.make((Mass("*", scale=1.3),))
     certificate = source.unwrapped.certify_shift(source, target)
@@ -211,7 +211,7 @@ def test_its_shift_is_certified(robot: _Robot) -> None:
 
 
 @each_robot
-def test_it_passes_the_exam(robot: _Robot) -> None:
+def test_a_robot_passes_the_exam(robot: _Robot) -> None:
     """The exam of `shapechanger envs check`."""
     if robot.no_exam:
         with pytest.raises(BrokenPromise, match=robot.no_exam):
@@ -221,10 +221,10 @@ def test_it_passes_the_exam(robot: _Robot) -> None:
 
 
 @each_robot
-def test_it_can_learn(robot: _Robot) -> None:
+def test_a_robot_can_learn(robot: _Robot) -> None:
     """2,048 steps of PPO leave finite weights, and reach both ends of each actuator's range.
 
-    But for a robot that no step leaves whole.
+    A robot whose simulation diverges at every step is an exception.
     """
     task = f"{Move.__module__}:{Move.__qualname__}"
     arguments = {"path": str(robot.file), "task": task, "rig": to_json(robot.rig)}

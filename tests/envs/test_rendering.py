@@ -345,7 +345,7 @@ def test_gymnasium_records_videos(tmp_path: Path) -> None:
     "env_id", ["InvertedPendulum", "BigInvertedPendulum", "InvertedDoublePendulum"]
 )
 def test_a_pendulum_is_seen_whole_on_a_light_background(env_id: str) -> None:
-    """Its model has no sky; a longer pole is seen from farther away."""
+    """The background is light although the model has no sky, and the pole is in view."""
     env = gym.make(f"shapechanger/{env_id}-v1", render_mode="rgb_array")
     env.reset(seed=0)
     frame: Any = env.render()

@@ -37,7 +37,7 @@ def test_healthy_ranges_equal_gymnasiums(name: str) -> None:
 @pytest.mark.parametrize("name", _HEALTHY)
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_healthy_heights_scale_with_the_body(name: str, factor: float) -> None:
-    """They are proportional to the standing height, after a reset too."""
+    """Healthy heights are proportional to the standing height, also after a reset."""
     plain, legs = _made(name), Stretch(_LEGS[name], factor)
     tall = _made(name, body=legs)
     growth = tall.standing_height / plain.standing_height

@@ -53,7 +53,7 @@ def task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 
 
 def test_a_task_keeps_bodies_layouts_and_certificates(task: str) -> None:
-    """It names its numbers, takes edits of the body, and certifies a shift."""
+    """A task of another module has a layout, edits of the body, and a certificate of a shift."""
     source, target = EnvRef(task).make(), EnvRef(task, {"body": "odrl-hopper-morph-torso-easy"})
     shifted = target.make()
     with source, shifted:

@@ -225,7 +225,7 @@ def test_invalid_arguments_are_refused(make: Callable[[], Any], message: str) ->
 
 
 def test_positions_are_those_of_the_function() -> None:
-    """Neither rounded nor interpolated; a function gets floats, and none before 0 s."""
+    """Positions are exact; the function is called with floats, never below 0 s."""
     seen: list[float] = []
 
     def function(t: float) -> Point:

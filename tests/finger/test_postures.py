@@ -43,7 +43,7 @@ def test_postures_are_away_from_limits_and_varied(draw: Callable[..., np.ndarray
 
 
 def test_every_posture_of_the_range_can_be_held() -> None:
-    """Also at its corners, so that no drawn one needs a check."""
+    """The corners of the range can be held too, so drawn postures need no check."""
     low, high = inner_range()
     shares = np.stack(np.meshgrid(*[[0.0, 0.5, 1.0]] * 4), axis=-1).reshape(-1, 4)
     for share in shares:

@@ -175,7 +175,7 @@ class _Check:
             assert self.has("equality", "mimic_2")
 
     def switched_off_weld(self) -> None:
-        """It holds the tool as it would have before, wherever the arm is now."""
+        """A weld that is switched off keeps its relative pose, wherever the arm is now."""
         touched = getattr(self.edit, "body", "") in ("tool", "left")
         if self.has("equality", "grasp") and not touched and not self.copied:
             old, new = (model.equality("grasp").data for model in (self.before, self.after))
@@ -198,7 +198,7 @@ class _Check:
                 assert lengths[0] == pytest.approx(lengths[1])
 
     def actuators(self) -> None:
-        """They drive what they drove, servos to the targets that they are told."""
+        """Actuators keep their targets, and servos their set points."""
         expected = {*_names(self.before, "actuator")}
         if not isinstance(self.edit, Lock) and not self.gone:
             assert expected <= {*_names(self.after, "actuator")}
@@ -222,7 +222,7 @@ class _Check:
                 assert all(self.has("actuator", f"{motor}_2") for motor in motors.split())
 
     def sensors(self) -> None:
-        """They measure what they measured."""
+        """Sensors measure the same elements as before."""
         for name in {*_names(self.after, "sensor")} & {*_names(self.before, "sensor")}:
             assert _sensed(self.after, name) == _sensed(self.before, name)
         if not isinstance(self.edit, Lock) and not self.gone:

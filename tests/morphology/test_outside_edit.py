@@ -73,7 +73,7 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def test_an_edit_of_a_file_outside_is_an_edit_like_any_other(module: Any) -> None:
-    """It has JSON, a share, a path to other bodies, a certificate, and a place in an env."""
+    """An edit of another module has JSON, an amount, paths, a certificate, and works in an env."""
     edit = module.Soften("sole", 0.2)
     assert json.loads(to_json([edit])) == [{"edit": "soften", "geom": "sole", "margin": 0.2}]
     assert from_json(to_json([edit])) == (edit,)
@@ -92,7 +92,7 @@ def test_an_edit_of_a_file_outside_is_an_edit_like_any_other(module: Any) -> Non
 
 
 def test_a_family_of_a_file_outside_can_be_drawn_from(module: Any, tmp_path: Path) -> None:
-    """Its axes may be of the new edit."""
+    """The axes of such a family may use an edit of another module."""
     path = tmp_path / "leg.xml"
     path.write_text(LEG, encoding="utf-8")
     family = module.LEGS

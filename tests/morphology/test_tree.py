@@ -194,7 +194,7 @@ def test_an_actuator_goes_to_the_joint_that_it_turns_most(
     ],
 )
 def test_the_strength_of_a_tendon_is_a_torque(actuators: str, torque: float) -> None:
-    """Its force counts with its moment about the joint."""
+    """The strength is the tendon's force times its moment arm about the joint."""
     model = mujoco.MjModel.from_xml_string(_TENDONS.format(actuators))
     strength = _number(tree_of(model, np.zeros(model.nq)), "wrist", "strength")
     assert strength == pytest.approx(math.log10(1.0 + torque) / 2.0)

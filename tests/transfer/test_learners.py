@@ -292,8 +292,8 @@ def test_fine_tuning_explores(source: float, start: float, tmp_path: Path) -> No
     assert load_policy(tmp_path / "policy.safetensors").card == policy.card
 
 
-def test_it_never_explores_more_than_a_new_policy() -> None:
-    """Where a learner starts with less, so does fine-tuning."""
+def test_a_start_policy_explores_no_more_than_a_new_policy() -> None:
+    """If new policies of a learner explore less, so does fine-tuning with this learner."""
     policy, _ = _tuned(_source(-4.0), msgspec.structs.replace(_LONG, log_std_init=-2.0))
     assert policy.card.start_log_std == (pytest.approx(-2.0),)
 

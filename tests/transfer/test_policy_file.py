@@ -198,7 +198,7 @@ def test_names_are_in_the_file(files: tuple[Path, Path]) -> None:
     assert json.loads(facts["action_names"]) == list(card.action.names)
 
 
-def test_it_runs_without_pytorch(files: tuple[Path, Path]) -> None:
+def test_an_onnx_file_runs_without_pytorch(files: tuple[Path, Path]) -> None:
     """OnnxPolicy works where torch cannot be imported."""
     code = (
         "import sys; sys.modules['torch'] = None; import numpy as np; from pathlib import Path; "

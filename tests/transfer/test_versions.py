@@ -149,7 +149,7 @@ def test_versions_stand_in_plan_run_and_card(copied: Path) -> None:
 
 
 def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
-    """So does another version on another node: each run compares before and after."""
+    """A run compares versions before and after, so a different version on a node ends it too."""
     plan = plan_of("shared")
     (copied / "b.xml").write_text(XML.format(0.5))
     run = Run("scratch", 0)
@@ -163,7 +163,7 @@ def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
 
 
 def test_a_run_of_another_version_is_refused(copied: Path) -> None:
-    """Even where somebody has copied its folder into a study."""
+    """A run of another version is refused, even if its folder was copied into the study."""
     plan = plan_of("shared")
     path = copied / "study" / "runs" / "scratch-0" / "run.json"
     result = msgspec.json.decode(path.read_bytes())

@@ -195,7 +195,7 @@ class PoliciesExport(_InEnv):
     out: Path
     """The file to write, such as ant.onnx."""
     format: Literal["onnx"] = "onnx"
-    """Its format."""
+    """Format of the exported file."""
 
     def run(self) -> None:
         policy = load_any_policy(self.file, self.learner)

@@ -147,7 +147,7 @@ def test_cameras_that_differ_are_warped_each_by_its_own_geometry(tmp_path: Path)
 
 
 def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
-    """So does one whose vehicle stands all the time."""
+    """A recording without speeds, or of a vehicle at rest, needs `--response`."""
     data = _loaded(_record(tmp_path / "none", state=None))
     with pytest.raises(DemosError, match=r"lacks steering/applied, speed, yaw_rate: give --resp"):
         as_waypoints(data)

@@ -126,8 +126,8 @@ def said(pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]) -> Said:
     return run
 
 
-def test_it_says_what_it_did(pi: FakePi, car: Profile, said: Said) -> None:
-    """Once done, everything is there already, and nothing has to follow."""
+def test_install_reports_each_change(pi: FakePi, car: Profile, said: Said) -> None:
+    """Each change is printed; a second run changes nothing and asks for no restart."""
     lines = said()
     unit = pi.root / "etc/systemd/system/shapechanger-rover.service"
     assert "did      group gpio: pi is in the group gpio." in lines

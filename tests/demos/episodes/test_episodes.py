@@ -234,7 +234,7 @@ def test_an_invalid_step_is_refused(
     ],
 )
 def test_an_invalid_header_is_refused(tmp_path: Path, change: dict[str, object]) -> None:
-    """Nor is a disk filled that is nearly full."""
+    """An invalid header, and a disk that is nearly full, are refused."""
     with pytest.raises(DemosError, match=f"The header is invalid .*{next(iter(change))}"):
         EpisodeWriter.create(tmp_path / "data", header(**change), spare_bytes=0)
     assert not (tmp_path / "data").exists()

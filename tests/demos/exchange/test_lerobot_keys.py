@@ -238,7 +238,7 @@ def test_a_video_that_claims_more_than_it_holds(tmp_path: Path, table: bytes, of
 
 
 def test_a_damaged_image(tmp_path: Path) -> None:
-    """Its episode is left out, and the next episode is not."""
+    """The episode of a damaged image is left out, and the next episode is imported."""
     folder = write_set(tmp_path / "set", options=["-g", "1", "-movflags", "+faststart"])
     with av.open(str(folder / VIDEO)) as file:
         image = list(file.demux(video=0))[5]

@@ -92,7 +92,7 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
 def test_drives_are_whole_records_in_order_of_one_size_and_without_jumps(
     made: list[tuple[int | None, Any]],
 ) -> None:
-    """So that rates and jumps see the others as missing."""
+    """Other records count as missing when rates and jumps are computed."""
     records = [
         ExchangeRecord(
             name=f"record {n}",

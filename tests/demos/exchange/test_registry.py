@@ -72,7 +72,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 
 @pytest.mark.usefixtures("installed")
 def test_a_format_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """It is detected, read and written by the commands, which know nothing of it."""
+    """The commands detect, read and write a format that another package registers."""
     source = tmp_path / "drive"
     source.mkdir()
     (source / "speeds.txt").write_text("0.5\n1.5\nfast\n")

@@ -158,7 +158,7 @@ def test_every_array_is_watched(name: str) -> None:
     ],
 )
 def test_every_option_and_statistic_is_watched(part: str, name: str) -> None:
-    """Also a statistic, by which the solver scales its tolerance."""
+    """Statistics are watched too, because the solver scales its tolerance by one."""
     watch, owner = ModelWatch(_MODEL), getattr(_MODEL, part)
     value = getattr(owner, name)
     before = np.copy(value)

@@ -137,7 +137,7 @@ def test_the_noise_never_changes() -> None:
 
 @pytest.mark.parametrize("velocity", [torch.nan, 1e12])
 def test_a_world_that_diverges_restarts_alone(velocity: float) -> None:
-    """Its reward is 0, its number is true in `diverged`, and the others step as ever."""
+    """A diverged world has a reward of 0 and is marked in `diverged`; the others are unaffected."""
     whole, broken = pendulums(), pendulums()
     still = torch.zeros(WORLDS, 1)
     broken.batches[0].qvel[1] = velocity

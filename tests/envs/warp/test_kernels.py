@@ -37,7 +37,7 @@ def test_our_kernels_compile_for_an_h100(tmp_path: Path) -> None:
 def test_all_kernels_of_the_trial_compile_for_an_h100(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So do mujoco-warp's, with the functions of ours inside them."""
+    """All kernels compile, including mujoco-warp's with the functions that we replace."""
     monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
     modules = gpu_kernels.launched()
     assert len(modules) > 50

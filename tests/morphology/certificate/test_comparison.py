@@ -96,7 +96,7 @@ def _extend(spec: mujoco.MjSpec) -> None:
 def test_a_difference_is_a_sentence(
     edit: Callable[[mujoco.MjSpec], object], sentences: list[str]
 ) -> None:
-    """And the way back is the same change the other way round."""
+    """Each difference is a sentence, and comparing in reverse swaps before and after."""
     source, target = asset("ant"), _edited(edit)
     changes, back = compare(source, target), compare(target, source)
     found = grouped(changes)

@@ -237,7 +237,7 @@ _CURABLE: dict[str, Callable[[mujoco.MjModel], object]] = {
 
 @pytest.mark.parametrize("what", [*_UNSEEN, *_CURABLE])
 def test_values_without_effect_are_left_out(what: str) -> None:
-    """They change neither the numbers nor a simulated motion."""
+    """Values without effect change neither the compared numbers nor a simulated motion."""
     nominal, written = everything(), everything()
     (_UNSEEN | _CURABLE)[what](written)
     assert moved_numbers(written) == moved_numbers(nominal)
@@ -321,7 +321,7 @@ def test_switches_and_what_is_rare_counts(
 
 
 def test_a_fingerprint_is_the_same_in_every_process() -> None:
-    """It is a short hexadecimal number, and does not depend on the hash seed of Python."""
+    """A fingerprint is 16 hexadecimal digits, and does not depend on Python's hash seed."""
     script = (
         f"import sys; sys.path[:] = {sys.path!r}\n"
         "import mujoco\n"

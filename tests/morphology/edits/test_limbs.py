@@ -122,7 +122,7 @@ def test_used_names_are_refused(name: str) -> None:
 
 
 def test_a_segment_grows_at_the_far_end() -> None:
-    """It has the thickness, density, friction and hinge of its parent."""
+    """The new segment has the thickness, density, friction and hinge of its parent."""
     spec = leg()
     spec.geom("shin").friction = [0.7, 0.01, 0.001]
     model = built(spec, AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=4.0))

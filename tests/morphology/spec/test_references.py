@@ -258,7 +258,7 @@ def test_a_flex_is_not_torn(edit: Edit) -> None:
 
 
 def test_a_tuple_loses_what_is_removed() -> None:
-    """And keeps the rest."""
+    """Removed elements leave a tuple, which keeps the others."""
     text = """<custom><tuple name="both"><element objtype="body" objname="lower" prm="1"/>
       <element objtype="body" objname="other" prm="2"/></tuple></custom>"""
     model = built(arm(text), Remove("lower"))

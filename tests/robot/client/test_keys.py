@@ -173,7 +173,7 @@ def test_an_arrow_is_one_key_however_it_is_split(sequence: bytes, key: str) -> N
 
 @pytest.mark.parametrize("sequence", UNKNOWN, ids=repr)
 def test_an_unknown_sequence_is_no_key_however_it_is_split(sequence: bytes) -> None:
-    """Nor does any part of one move a robot or type anything."""
+    """No part of an unknown sequence moves a robot or types a character."""
     assert set(pieces([sequence], 0.0)) == {OTHER}
     splits = [(sequence[:place], sequence[place:]) for place in range(1, len(sequence))]
     for parts in (*splits, [bytes([byte]) for byte in sequence]):

@@ -54,7 +54,7 @@ def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> Non
 def test_a_page_that_dies_stops_the_robot_within_the_deadline(
     hasty_car: RunningRobot, visit: Visit
 ) -> None:
-    """Its process ends without a message, as with a closed tab at the worst."""
+    """The page's process crashes without a message, the worst case of a closed tab."""
     console, pins = visit(hasty_car), Pins(hasty_car)
     console.arm()
     console.drive("w", pins)
@@ -73,7 +73,7 @@ def test_a_page_that_dies_stops_the_robot_within_the_deadline(
 def test_space_and_escape_stop_the_robot_with_any_focus(
     car: RunningRobot, visit: Visit, key: str, focus: str
 ) -> None:
-    """Neither presses a focused button, and only arming again ends the stop."""
+    """Space and Escape press no focused button, and only arming again ends the stop."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)

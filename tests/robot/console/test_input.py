@@ -190,7 +190,7 @@ def test_held_keys_are_released_with_modifiers_and_the_focus(person: Input) -> N
 
 
 def test_combinations_and_input_methods_are_no_orders(person: Input) -> None:
-    """Neither are keys for a list, and a held Enter presses a button once."""
+    """Combinations, input methods and keys in a list move nothing; a held Enter presses once."""
     for modifier in (1, 2, 4):
         for code, key in zip(_PLACES, LAYOUTS["QWERTY"].split(), strict=True):
             person.tap(code, key, modifiers=modifier, commands=[])

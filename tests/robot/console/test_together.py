@@ -178,7 +178,7 @@ def test_sliders_drive_a_finger(chromium: Browser, tmp_path: Path) -> None:
 
 
 def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_path: Path) -> None:
-    """It drives once a person arms the robot, until one presses a key."""
+    """A policy drives once a person arms the robot, until a person presses a key."""
     car = write_profile(tmp_path, PATIENT_CAR)
     net = {"eyes": "none", "nerves": (1,), "low": (0.3, 0.3), "high": (0.3, 0.3)}
     card = clone_card(car.action_layout(), car.state_layout(), **net)

@@ -48,7 +48,7 @@ def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> Non
 
 @pytest.mark.parametrize("name", ["key", "certificate.pem", "certificate.key"])
 def test_incomplete_and_malformed_credentials_are_refused(tmp_path: Path, name: str) -> None:
-    """They are not completed, because clients have stored the others."""
+    """Missing files are not made again, because clients have stored the existing credentials."""
     make_credentials(tmp_path, "car")
     if name != "certificate.key":  # OpenSSL reads that one.
         for garbage in (b"short", b"\xff\xfe"):

@@ -99,7 +99,7 @@ def test_a_daemon_serves_sends_heartbeats_and_ends_on_a_signal(started: Started)
 
 
 def test_the_lifeline_ends_when_the_daemon_is_killed(started: Started) -> None:
-    """Its thread holds no other file."""
+    """The thread of the lifeline has no other file open."""
     tasks = Path(f"/proc/{started.process.pid}/task")
     assert 1 in {len(list((task / "fd").iterdir())) for task in tasks.iterdir()}
     poll = select.poll()

@@ -105,7 +105,7 @@ async def test_leaving_disarms_the_robot(robot: Running, how: str) -> None:
 
 
 async def test_an_emergency_stop_is_reported_to_all(robot: Running) -> None:
-    """So are refusals of the guard; a person who has seen the stop ends it."""
+    """All clients get stops, and refusals of the guard; a person who has seen a stop ends it."""
     async with robot.client(role="person") as ann, robot.client(name="sac") as sac:
         await robot.armed(ann)
         await sac.send(EmergencyStop(reason="a cat"))
@@ -125,7 +125,7 @@ async def test_an_emergency_stop_is_reported_to_all(robot: Running) -> None:
 async def test_a_client_that_does_not_read_is_dropped(
     robot: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And it does not delay other clients."""
+    """A client that does not read is dropped, and does not delay others."""
     patience_s = 3.0
     monkeypatch.setattr(session, "_SEND_S", patience_s)
     loop, worst = asyncio.get_running_loop(), 0.0

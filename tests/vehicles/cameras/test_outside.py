@@ -33,7 +33,7 @@ def _changed(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> NDArray[np.boo
 
 
 @pytest.mark.parametrize("vehicle", HOME)
-def test_it_shows_the_vehicle_in_its_world(vehicle: str) -> None:
+def test_the_outside_view_shows_the_vehicle_in_its_world(vehicle: str) -> None:
     """The vehicle is in the middle, smaller with a larger reach, on ground with a texture."""
     world = MujocoWorld(vehicle, size=None)
     near, far = world.outside(160, 120), world.outside(160, 120, 3.0 * world.reach)

@@ -248,7 +248,7 @@ class Clone(Policy):
 
     @property
     def net(self) -> CloneNetwork:
-        """Its architecture."""
+        """Architecture of the network."""
         return self.card.network
 
     def outputs(
