@@ -37,7 +37,7 @@ _SAYS = {
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize("example", _EXAMPLES, ids=lambda example: example.stem)
 def test_an_example_runs(example: Path, tmp_path: Path) -> None:
-    """Without warnings of ours, in a folder that it has never seen."""
+    """An example runs in an empty folder, without warnings of Shapechanger."""
     run = subprocess.run(
         [sys.executable, str(example), *_ARGUMENTS.get(example.stem, _FEW)],
         check=False,

@@ -42,7 +42,7 @@ def test_bounds_are_expanded() -> None:
 
 
 def test_features_are_found() -> None:
-    """By name, by place as in a tuple, and by a glob."""
+    """Features are found by name, by index and by a glob."""
     assert LAYOUT["eye/image"] is LAYOUT[1] is EYE
     assert str(HINGE) == "hinge/angle [rad]"
     assert "eye/image" in LAYOUT

@@ -62,7 +62,7 @@ def test_forty_commands(robot: RunningRobot) -> None:
 def test_without_commands_the_robot_stops_at_the_deadline(
     robot: RunningRobot, profile: Profile
 ) -> None:
-    """By the ledger, not before the deadline of the last command, and within a tick after it."""
+    """The ledger shows rest within a tick of the deadline of the last command."""
     # Without the one-shot, which would hide late pins.
     wiring = TwinWiring(profile.guard_plan(), None)
     with driving(robot, "twin") as car:

@@ -34,8 +34,8 @@ def _curve(file: Path, gear: float, reach: float) -> list[Evaluation]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_a_hoist_learns_alike_in_newtons(tmp_path: Path) -> None:
-    """To the last bit where the factor between the units is a power of two, and learns."""
+def test_a_hoist_learns_the_same_in_newtons(tmp_path: Path) -> None:
+    """If the units differ by a power of two, the learning curves are equal to the last bit."""
     share, newtons = (_curve(tmp_path / "hoist.xml", *each) for each in ((32, 1), (1, 32)))
     assert share == newtons
     assert share[0].mean_return < -450.0

@@ -34,7 +34,7 @@ def findings(installed: dict[str, str], dev: Path = Path("/nowhere")) -> dict[st
 
 
 def test_an_extra_that_is_not_installed_is_named_with_its_command() -> None:
-    """What is missing is optional; packages of another system and `all` are not asked for."""
+    """Missing extras are not errors; packages for other systems, and `all`, are not checked."""
     results = findings({"core-package": "2.5"})
     assert results["core"].level == "good"
     assert results["extra learn"].level == "unknown"

@@ -70,7 +70,7 @@ def test_names_are_printed_as_they_are(cli: Cli) -> None:
 
 
 def test_the_bodies_of_odrl_are_one_row(cli: Cli) -> None:
-    """Unless asked for: 84 ids would drown the others."""
+    """`envs list` lists the 84 bodies of ODRL only with --odrl."""
     text = cli.output("envs", "list")
     assert "80 targets of ODRL" in text
     assert "odrl-hopper-friction-0.1" not in text

@@ -71,7 +71,7 @@ SUITE = "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\
 def test_a_module_of_the_current_folder_is_found(
     module: str, content: str, arguments: list[str], words: str, folder: Path, cli: Cli
 ) -> None:
-    """As the documentation of a user's own methods and learners promises."""
+    """A user's module is imported from the current folder, as the documentation says."""
     (folder / f"{module}.py").write_text(content)
     (folder / "mine.toml").write_text(SUITE)
     assert words in cli.refused(*arguments)
@@ -99,7 +99,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def project(done: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """That folder, as an installed program sees it: modules are not looked for there."""
+    """The folder of `done`, which is not in the module path, as for an installed program."""
     monkeypatch.chdir(done)
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each not in ("", str(done))])
     monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
@@ -133,7 +133,7 @@ def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(project: Path
 def test_a_suite_is_watched_with_own_methods(
     project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
-    """From elsewhere the message says where to go, and to delete nothing."""
+    """From another folder, the message names the folder to go to, and does not say to delete."""
     assert "a-to-b" in cli.output("suite", "watch", "suite")
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(project)])
     monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})

@@ -229,7 +229,7 @@ def test_a_policy_is_trained_on_a_gpu(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_a_policy_is_evaluated_in_any_body(policy: Path, cli: Cli) -> None:
-    """Without a body in the family's own, otherwise in the named one, without a body map."""
+    """A limb policy runs in its own family's body, or the one that --env names, without a map."""
     evaluate = ("policies", "evaluate", policy, "--episodes", "1")
     own, other = cli.output(*evaluate), cli.output(*evaluate, "--env", "ExtendedAnt")
     assert "forward speed" in own

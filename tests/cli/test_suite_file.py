@@ -97,5 +97,5 @@ def test_a_mistake_in_a_file_gives_one_sentence(
     ],
 )
 def test_folders_are_named_after_envs(env_id: str, name: str) -> None:
-    """Without characters that other systems refuse."""
+    """The folder's name has no characters that other operating systems refuse."""
     assert short_name(env_id) == name

@@ -77,7 +77,7 @@ def test_weights_are_set_by_name() -> None:
 
 @given(st.floats(0.0, 0.5), st.floats(0.6, 1.0), st.floats(0.0, 1.0))
 def test_a_duty_has_the_size_of_its_value(start: float, full: float, value: float) -> None:
-    """Within a step of 1 %; only a duty of 0 stops the motor."""
+    """A duty's size equals its value within a step of 1 %; only a duty of 0 stops the motor."""
     duty = Duty(start, full)
     size = duty.size_at(duty.of(value))
     assert size == pytest.approx(value, abs=0.5 / 100 / (full - start) + 1e-9) or size == 0.005

@@ -214,7 +214,7 @@ def test_shapes_are_those_published(name: str) -> None:
 @pytest.mark.parametrize("level", range(3), ids=_LEVELS)
 @pytest.mark.parametrize("task", _RANGES)
 def test_ranges_are_those_published(task: str, level: int) -> None:
-    """To 1e-12 rad; nothing else changes."""
+    """The ranges equal the published ones to 1e-12 rad, and the rest of the model is unchanged."""
     name = f"{task}-{_LEVELS[level]}"
     model, source = _model(name), _source(name)
     for joint, ranges in _RANGES[task].items():

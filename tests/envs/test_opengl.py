@@ -49,7 +49,7 @@ def test_an_installed_library_is_chosen(libraries: dict[str, str], chosen: str) 
 
 @pytest.mark.parametrize("choice", ["egl", "osmesa", "glfw"])
 def test_mujoco_gl_takes_precedence(choice: str) -> None:
-    """Other values are refused with those that exist."""
+    """Values that do not exist are refused, and the message lists the valid ones."""
     assert _output(_installed() + _CHOOSE, MUJOCO_GL=choice) == choice
     run = run_python(_CHOOSE, MUJOCO_GL=choice.upper())
     assert run.stderr.splitlines()[-1] == (

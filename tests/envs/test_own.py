@@ -98,7 +98,7 @@ def test_a_robot_starts_at_home(dog: Path) -> None:
     ],
 )
 def test_a_home_is_kept_joint_by_joint(dog: Path, body: Edit, angles: list[float]) -> None:
-    """Where edits add or remove joints; MuJoCo fills a keyframe at its end."""
+    """The keyframe keeps its angles by joint if edits add or remove joints."""
     env = shapechanger.from_mjcf(dog, body=body, reset_noise_scale=0.0)
     env.reset(seed=0)
     np.testing.assert_allclose(_inner(env).data.qpos[7:], angles)
@@ -112,7 +112,7 @@ def test_a_start_height_is_that_of_the_home_too(dog: Path) -> None:
 
 
 def test_without_a_home_joints_start_inside_their_limits(dog: Path) -> None:
-    """At the model's own pose."""
+    """Without a keyframe, joints start in the model's own pose."""
     dog.write_text(DOG[: DOG.index("  <keyframe>")] + "</mujoco>")
     env = shapechanger.from_mjcf(dog, reset_noise_scale=0.0)
     env.reset(seed=0)
@@ -149,7 +149,7 @@ def test_a_robot_without_shapes_is_a_robot(tmp_path: Path) -> None:
 
 
 def test_every_number_can_be_read(dog: Path) -> None:
-    """By its name, observed or not; others are named."""
+    """Any number of the robot can be read by its name; unknown names are refused."""
     inner = _inner(shapechanger.from_mjcf(dog, Rear))
     robot = inner.seen(np.zeros(2), np.zeros(3))
     assert robot["trunk/x"] == inner.data.qpos[0]
@@ -224,7 +224,7 @@ def test_certificates_name_the_files(dog: Path, tmp_path: Path) -> None:
 
 
 def test_many_at_once_equal_one_by_one(dog: Path) -> None:
-    """To the last bit, over the ends of episodes."""
+    """The vector env equals single envs to the last bit, also after the end of an episode."""
     options: dict[str, Any] = {"path": str(dog), "task": REAR, "max_episode_steps": 5}
     many = shapechanger.make_vec("shapechanger/OwnRobot-v1", 3, threads=2, **options)
     sync = gym.make_vec("shapechanger/OwnRobot-v1", 3, vectorization_mode="sync", **options)

@@ -142,7 +142,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
 
 
 def test_a_task_may_end_the_episode() -> None:
-    """By default it does not; its answer must be true or false."""
+    """A task ends no episode by default; `terminated` must return true or false."""
     task, _ = as_task(Still)
     assert not has_ended(task, "mine", robot())
     for answer in (True, np.True_):

@@ -120,7 +120,7 @@ def test_arms_that_cannot_balance_are_refused() -> None:
 
 
 def test_the_arms_of_an_et_al_are_used_although_they_do_not_balance() -> None:
-    """By the name of their set; as numbers of one's own they are refused."""
+    """The set can be used by its name; the same arms, given as numbers, are refused."""
     env = FingerReachEnv(parameters="an-1983")
     env.reset(seed=0)
     assert env.step(np.zeros(7, np.float32))[4]["distance"] > 0.0

@@ -181,7 +181,7 @@ def test_a_step_from_the_same_state_has_the_same_results(
 
 @pytest.mark.parametrize("kind", ["plain", "rigs", "circles", "open paths"])
 def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
-    """Nothing of the state is missing: steps that follow each other agree, too."""
+    """Steps after the same start agree too, so the whole state was copied."""
     worlds, alone = many(kind)
     rng = np.random.default_rng(1)
     begun = start_alike(worlds, alone, 3)

@@ -99,7 +99,7 @@ def test_tendons_are_slack_within_the_backlash() -> None:
 
 
 def test_joints_stiffen_towards_the_ends_of_their_ranges() -> None:
-    """At the farther end, four times as stiff as at rest."""
+    """A joint is four times as stiff at the farther end of its range as at rest."""
     model, data = made(), mujoco.MjData(made())
     model.tendon_stiffness[model.tendon(HOOD).id] = 0.0
     for j, (low, high) in enumerate(JOINT_RANGE):

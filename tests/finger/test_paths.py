@@ -240,7 +240,7 @@ def test_positions_are_those_of_the_function() -> None:
 
 @pytest.mark.parametrize("given", [(0.0, 0.0), "abc", (0.0, 0.0, "z"), None, (0, 0, math.nan)])
 def test_a_point_is_three_finite_numbers(given: object) -> None:
-    """Other results raise an error that shows them, also beyond the trial."""
+    """Other results raise an error that shows them, at any time of the path."""
     function: Any = lambda t: given if t > 60.0 else (0.0, 0.0, 0.0)  # noqa: E731
     path = from_callable(function)
     for fails in (lambda: path.at([59.0, 61.0]), lambda: from_callable(lambda _: given)):

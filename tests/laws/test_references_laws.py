@@ -77,7 +77,7 @@ _EDITS: dict[type[Edit], st.SearchStrategy[Any]] = {
 def test_references_point_to_where_geometry_says(
     kind: type[Edit], mechanism: Mechanism, data: st.DataObject
 ) -> None:
-    """After any edit, or the edit says in a sentence what stands in its way."""
+    """References are correct after any edit, or the edit is refused with a reason."""
     edit = data.draw(_EDITS[kind])
     before = mechanism.spec().compile()
     try:

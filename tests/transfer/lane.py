@@ -87,7 +87,7 @@ class _Keeper:
         self._rng = np.random.default_rng(seed)
 
     def begin(self) -> None:
-        """Nothing to do at the start of an episode."""
+        """Do nothing at the start of an episode."""
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         meant = np.array([-self._lane.place, 0.5], np.float32)

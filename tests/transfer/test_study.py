@@ -174,7 +174,7 @@ class _Planned(Executor):
 
 
 def test_runs_of_a_robot_wait_for_one_another(tmp_path: Path) -> None:
-    """None moves the robot again once one has failed, on whatever executor."""
+    """After a failed run, no other run moves the robot, on any executor."""
     plan, planned = msgspec.structs.replace(tiny_plan(), exclusive=True), _Planned()
     with pytest.raises(StudyError, match="are not in"):
         run_study(plan, tmp_path / "robot", executor=planned)

@@ -114,7 +114,7 @@ _LOOKS = {
 
 @pytest.mark.parametrize("look", _LOOKS)
 def test_an_edit_without_effect_resumes(look: str, copied: Path) -> None:
-    """What neither moves nor is sensed or run does not count."""
+    """Edits that change neither motion, sensors nor executed code do not count."""
     file, content = _LOOKS[look]
     (copied / file).write_text(content, newline="")
     before = (copied / "study" / "study.json").read_bytes()

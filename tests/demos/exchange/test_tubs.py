@@ -211,7 +211,7 @@ def test_pictures_of_other_records(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("lines", [0, 4])
 def test_a_damaged_manifest(tmp_path: Path, lines: int) -> None:
-    """After a power cut while it was written nothing tells which records were deleted."""
+    """A manifest that was cut off is refused, because it lists the deleted records."""
     folder = tub_folder(tmp_path / "tub", records(6), [0])
     manifest = folder / "manifest.json"
     manifest.write_bytes(b"".join(manifest.read_bytes().splitlines(True)[:lines]) + bytes(99))
@@ -269,7 +269,7 @@ def test_a_measured_rate_is_that_of_some_periods(periods_ns: list[float]) -> Non
 
 
 def test_periods_of_two_kinds() -> None:
-    """Where neither prevails, the steps in a second are counted; a few others do not count."""
+    """The rate follows from the prevailing period, or else from the mean period."""
     assert measured_hz([50e6, 430e6] * 50) == pytest.approx(1 / 0.24)
     assert measured_hz([50e6] * 60 + [430e6] * 40) == pytest.approx(20.0)
 

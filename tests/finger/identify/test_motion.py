@@ -134,7 +134,7 @@ def test_motors_follow_with_their_lag() -> None:
 
 
 def test_strength_needs_saturation() -> None:
-    """Without saturation the strength is that assumed."""
+    """Without saturation, the assumed strength is returned."""
     strong = tuple(3.0 * tension for tension in NOMINAL.most_tension)
     log, _ = recorded(3.0, actions="tension", parameters=NOMINAL.replace(most_tension=strong))
     found = fit_motors(changed(log, motors=None))

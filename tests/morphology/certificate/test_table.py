@@ -341,7 +341,7 @@ _ROUNDED = ("body_", "geom_", "site_", "jnt_", "dof_", "qpos", "actuator_", "ten
 @pytest.mark.parametrize("name", ["ant", "humanoid", "everything"])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_last_bits_do_not_count(name: str, seed: int) -> None:
-    """Another processor rounds every number in its own way, and a computed zero is not zero."""
+    """Rounding by another processor, also of a computed zero, does not change the fingerprint."""
     model = everything() if name == "everything" else asset(name)
     nominal, random = fingerprint(model), np.random.default_rng(seed)
     for array in (each for each in dir(model) if each.startswith(_ROUNDED)):

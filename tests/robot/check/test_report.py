@@ -46,7 +46,7 @@ def test_a_report_names_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_report_is_kept_whatever_happens(tmp_path: Path) -> None:
-    """What was found before an error stays, and so do earlier reports."""
+    """Findings before an error are kept, and earlier reports are not overwritten."""
     report = tmp_path / "report.txt"
     said: list[str] = []
     bad = Finding("drives", "bad", "It did not.")

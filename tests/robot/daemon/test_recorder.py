@@ -151,7 +151,7 @@ def test_the_next_observation_brings_the_applied_outputs() -> None:
 
 
 def test_the_later_of_two_decisions_counts() -> None:
-    """Without control or a next observation, nothing is known of the applied outputs."""
+    """If the client then loses control, the applied outputs of the step are unknown."""
     built = Built()
     sent = built.see(NET, seen(1, 100))
     built.decided(NET, sent, (0.5, 0.0), 110)

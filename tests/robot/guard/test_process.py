@@ -258,7 +258,7 @@ def test_the_button_is_an_emergency_stop(make: _Make) -> None:
 
 @pytest.mark.parametrize("reads", [True, False])
 def test_a_lost_daemon_disarms(make: _Make, reads: bool) -> None:
-    """Whether or not it leaves states unread, which resets the connection."""
+    """A lost daemon disarms, also if it left states unread, which resets the connection."""
     bench = make()
     bench.arms()
     bench.at(14, lambda: reads and bench.read())
@@ -366,7 +366,7 @@ def test_outputs_are_released_once_per_stop(make: _Make, monkeypatch: pytest.Mon
 
 
 def test_a_restart_after_a_failure_starts_in_emergency_stop(make: _Make) -> None:
-    """Only a person ends it."""
+    """Only a person ends the emergency stop after a restart."""
     bench = make(after_failure=True)
     bench.send(1, arm(_T0, 1, person=False), command(1, _T0))
     state = bench.run(20)

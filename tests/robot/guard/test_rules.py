@@ -151,7 +151,7 @@ def test_an_action_that_rests_outside_its_caps_is_refused() -> None:
 
 
 def test_slew_limits_moves_away_from_rest_only() -> None:
-    """At most 2 a second, also after a pause; a change of sides pauses at rest."""
+    """Values change by at most 2 a second, also after a pause, and change sign through rest."""
     robot = _Armed(car())
     steps = ((10, 0.5, 0.02), (10, 0.5, 0.04), (5, 0.05, 0.05), (5, 0.01, 0.01))
     steps += ((10, -0.4, 0.0), (10, -0.4, -0.02), (10, 0.4, 0.0), (10_000, 0.6, 0.04))

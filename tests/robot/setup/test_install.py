@@ -44,7 +44,7 @@ def pi(tmp_path: Path) -> FakePi:
 
 
 def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
-    """What the checks find bad in the computer's settings is what `install` puts in place.
+    """`install` corrects the settings of the computer that the checks find bad.
 
     A line below a filter, such as [pi5], applies to that model only; ours applies to all.
     """
@@ -101,7 +101,7 @@ def test_the_service_is_removed(pi: FakePi) -> None:
 
 
 def test_commands_run_as_root(pi: FakePi, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without root they go through sudo, and a failure is its last line; only a Pi is changed."""
+    """Without root, commands use sudo; a failure is its last line; only a Pi is accepted."""
     code = "import sys; sys.stderr.write('one\\ntwo\\n'); sys.exit(len(sys.stdin.read()))"
     script = RootCommand((sys.executable, "-c", code), "text")
     monkeypatch.setattr("os.geteuid", lambda: 0)

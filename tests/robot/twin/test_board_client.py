@@ -95,7 +95,7 @@ def test_requests_that_the_board_does_not_take_are_waited_for(tmp_path: Path) ->
 def test_a_board_that_never_replies_ends_the_heartbeats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After that the supervisor finds the guard silent."""
+    """The call fails without a beat, so the supervisor notices that the guard is silent."""
     monkeypatch.setattr(rpc, "_PATIENCE_S", 0.0)
     client, board = _connected(tmp_path)
     client.while_held_up = lambda: pytest.fail("a beat for a broken board")

@@ -56,7 +56,7 @@ def test_pins_of_a_killed_process_keep_their_level(
 
 
 def test_a_clean_exit_leaves_motors_low_and_keeps_plain_outputs(tmp_path: Path) -> None:
-    """As on a Pi, and the ledger records no dead process."""
+    """Pins are as on a Raspberry Pi, and the ledger records no dead process."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "0.7") as robot:
             robot.communicate("")

@@ -190,7 +190,7 @@ def test_probabilities_are_those_of_the_policy(policy: TrainedPolicy) -> None:
 
 
 def test_worlds_of_equal_spaces_and_several_batches() -> None:
-    """Where a vector env has one tensor for all batches, so have rows and actions."""
+    """Rows and actions are one tensor for all batches, like those of the vector env."""
     bodies = ["Swimmer", to_json([JointRange("free_body_rot", -2.0, 2.0)])]
     swimmer = EnvRef("shapechanger/Swimmer-v1")
     envs = shapechanger.make_vec("Swimmer", 2, backend="warp", device="cpu", bodies=bodies)

@@ -173,7 +173,7 @@ def test_improvement_matches_mann_whitney() -> None:
 
 
 def test_intervals_are_quantiles_of_the_resamples() -> None:
-    """From 2.5 to 97.5 %, of means over studies."""
+    """The interval is from 2.5 to 97.5 % of resampled means over studies."""
     rng = np.random.default_rng(1)
     arm, scratch = ([rng.normal(level, 1.0, 4) for level in (0.4, 0.0)] for _ in range(2))
     found = probability_of_improvement(arm, scratch, rng=_rng())

@@ -190,7 +190,7 @@ def test_median_is_none_if_most_seeds_are_censored() -> None:
 
 
 def test_no_seed_reaches_the_threshold() -> None:
-    """Then 0 steps are saved, without an interval."""
+    """If no seed reaches the threshold, 0 steps are saved, without an interval."""
     times = time_to_threshold(LATE, SLOW, 2.0)
     assert times.steps_saved.value == 0.0
     assert times.steps_saved.low is None
@@ -350,7 +350,7 @@ def test_arms_that_did_not_learn_leave_values() -> None:
 
 
 def test_both_ways_of_counting_use_the_same_resamples() -> None:
-    """Those of each measure begin with one draw of the generator."""
+    """Each measure's resamples start from one draw of the generator."""
     result = summary(source_steps=0)
     assert result.in_target_steps == result.in_total_steps
     draw = int(np.random.default_rng(0).integers(2**63))

@@ -36,7 +36,7 @@ def test_robots_that_do_not_fit(name: str, parts: set[str], message: str) -> Non
 
 
 def test_the_motor_matches_its_data_sheet() -> None:
-    """At 6 V: 6 A and 1.2 kgf·cm when stalled, 0.5 A at 2200 turns a minute without load."""
+    """The data sheet states, at 6 V, 6 A and 1.2 kgf·cm at stall, and 0.5 A at 2200 rpm."""
     free = 2200.0 * 2.0 * 3.141592653589793 / 60.0
     assert HOBBY_MOTOR.amperes(6.0, 0.0) == pytest.approx(6.0)
     assert HOBBY_MOTOR.amperes(6.0, free) == pytest.approx(0.5)

@@ -104,7 +104,7 @@ def test_a_vehicle_that_stands_is_moved() -> None:
 
 
 def test_a_teacher_leaves_rest_alike() -> None:
-    """What it demonstrates, and what its student learns, is what moved it in its own env."""
+    """A teacher demonstrates the throttle that moved the vehicle in the teacher's env."""
     action = np.array([1.0, -0.02], np.float32)
     with closing(VehicleEnv("car", image=False)) as env:
         env.reset(options=_COURSE)

@@ -189,7 +189,7 @@ def test_a_slack_tendon_is_found() -> None:
 @pytest.mark.parametrize("name", sorted(MODELS))
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_simulated_motor_matches_its_data_sheet(name: str, direction: int) -> None:
-    """Without load it reaches its speed; a blocked tendon has the tension kt i / r.
+    """A motor reaches its speed without load; a blocked tendon has the tension kt i / r.
 
     The tension is within the friction of the gears: the spool overshoots, and friction holds it.
     """
