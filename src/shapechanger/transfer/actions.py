@@ -40,8 +40,8 @@ class ActionScale(NamedTuple):
     def between(cls, space: Any, layout: Layout) -> ActionScale:
         """Return the scale from a model's own action space to the range of a layout.
 
-        It is the identity where both are the same, as of policies that were trained without a
-        scale, and for actions without a range on one of the sides.
+        It is the identity if both ranges are equal, as for policies that were trained without a
+        scale, and for actions that have no finite range in the space or in the layout.
         """
         box = cast("Box[Any]", space)
         # Bounds of a space are in single precision, bounds of a layout in double.

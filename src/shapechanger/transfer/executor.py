@@ -38,7 +38,7 @@ class Job:
             another process can import it.
         arguments: Its arguments; must be picklable.
         after: Names of the jobs that must end before it starts.
-        attempts: Times that it is tried while its process is lost; one that raises is not repeated.
+        attempts: Most attempts if its process is lost; a job that raises is not repeated.
     """
 
     name: str
@@ -49,14 +49,15 @@ class Job:
 
 
 Event = tuple[str, Literal["steps", "done", "lost"], Any]
-"""Name of a job, what happened, and its steps, its failure (None without), or how it was lost."""
+"""Name of a job, the kind of event, and its content: for "steps" the steps done so far, for "done"
+the failure or None, and for "lost" how the process was lost."""
 
 
 class Executor:
     """Runs jobs, each after those that it depends on.
 
-    A job that fails does not stop the others, except those that need its result. One whose process
-    is lost is repeated. A subclass states where jobs run.
+    A job that fails does not stop the others, except those that need its result. A job is repeated
+    if its process is lost. Subclasses define where jobs run.
     """
 
     # Number of jobs that run at the same time; None for all.
@@ -157,7 +158,7 @@ def failure_of(
         function(*arguments, report)
     except ShapechangerError as error:
         return error
-    except Exception:  # It crosses to the process that reports it.
+    except Exception:  # As text, because not every exception can be pickled.
         return traceback.format_exc()
     return None
 
@@ -203,7 +204,7 @@ class Processes(Executor):
     def _begin(self, job: Job) -> None:
         connection, process = self._idle.popitem() if self._idle else _worker()
         self._busy[connection] = process, job.name
-        with suppress(ConnectionError):  # A process that has ended is noticed when it is heard.
+        with suppress(ConnectionError):  # `_events` reports a process that has ended.
             connection.send((job.function, job.arguments))
 
     def _events(self) -> Iterable[Event]:
@@ -212,7 +213,8 @@ class Processes(Executor):
             process, job = self._busy[connection]
             try:
                 kind, content = connection.recv()
-            except (EOFError, ConnectionError):  # The latter if it has not read its job.
+            # ConnectionError if the process ended before it read its job.
+            except (EOFError, ConnectionError):
                 kind, content = "lost", f"exit code {_end(connection, process)}"
             if kind != "steps":
                 del self._busy[connection]
@@ -269,8 +271,8 @@ def _end_with_parent() -> None:
 def use_one_thread() -> None:
     """Limit PyTorch in this process to one thread.
 
-    Networks this small gain nothing from more, several runs share the machine, and sums in another
-    order are other sums.
+    Networks this small gain nothing from more threads, several runs share the machine, and with
+    another number of threads sums are rounded differently.
     """
     import torch  # It takes seconds to load, and plans and reports need none of it.
 

@@ -86,7 +86,7 @@ def _write(network: nn.Module, card: PolicyCard, path: Path) -> None:
 
 
 def _constant(module: nn.Module, **arrays: Any) -> None:
-    """Give a module constants, double for double ones."""
+    """Register arrays as buffers of a module, with their own precision."""
     for name, array in arrays.items():
         module.register_buffer(name, torch.as_tensor(np.asarray(array)))
 

@@ -1,4 +1,4 @@
-"""Versions of the env and the learner that a policy is made of, by "env" and "learner"."""
+"""Versions of the env and the learner of a policy, keyed by "env" and "learner"."""
 
 from __future__ import annotations
 

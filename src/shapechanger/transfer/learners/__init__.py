@@ -1,7 +1,7 @@
 """Learners: their settings declare what they take, and a `Learner` trains, evaluates and stores.
 
-A learner is one file, of Shapechanger or of another package: a class of settings, which the entry
-point of its name in the group `shapechanger.learners` gives, and the `Learner` that it names.
+A learner is one file, of Shapechanger or of another package: a class of settings, which is
+registered as an entry point in the group `shapechanger.learners`, and the `Learner` that it names.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 Takes = Literal[
     "trial", "on-policy", "off-policy", "callback", "demonstrations", "many bodies", "device"
 ]
-"""What a learner learns from, and in: steps in an env ("trial"), each once or from a replay buffer;
-a callback of Stable-Baselines3; demonstrations; many bodies at once; and worlds on a device."""
+"""Abilities and requirements of learners: steps in an env ("trial"), each used once or kept in a
+replay buffer; callbacks of Stable-Baselines3; demonstrations; many bodies at once; worlds on a
+device."""
 
 
 def ignore(evaluation: Evaluation) -> None:

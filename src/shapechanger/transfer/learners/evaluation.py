@@ -100,9 +100,9 @@ def evaluate(
     steps: int = 0,
     episodes: int | None = None,
 ) -> Evaluation:
-    """Average a policy's episodes, of which the first has the seed `seed` and later ones the next.
+    """Average a policy's episodes, whose seeds count up from `seed`.
 
-    Their number is rounded up to a multiple of the envs, with one for each env if it is not given.
+    The number of episodes is rounded up to a multiple of the envs; by default, one for each env.
     """
     played: list[_Episode] = []
     for first in range(0, len(envs) if episodes is None else episodes, len(envs)):

@@ -1,6 +1,6 @@
-"""Trained policies of Stable-Baselines3, their files, and zips that its models wrote.
+"""Trained policies of Stable-Baselines3: their files, and conversion of its own zips.
 
-Their file has the weights, the normalisation statistics and the bounds of the model's own spaces.
+A file has the weights, the normalisation statistics and the bounds of the model's own spaces.
 The model's actions are scaled from those bounds to the bounds of the action layout; in files of
 older versions the two are equal.
 """

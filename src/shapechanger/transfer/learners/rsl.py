@@ -1,12 +1,12 @@
 """PPO of rsl-rl on many worlds of one device, with the policies of Stable-Baselines3.
 
 Everything that learns is on the device: worlds, networks, statistics and batches. A training begins
-with the network of Stable-Baselines3's PPO of the same settings, and its weights go back there
-for evaluations, which the CPU env does, and into files. So cards, curves, transplants and exports
-are the same as for other learners.
+with the weights of a model of Stable-Baselines3's PPO with the same settings. The trained weights
+are copied back into this model, which is evaluated in the CPU env and saved. So cards, curves,
+transplants and exports are the same as for other learners.
 """
 
-# The learner of Stable-Baselines3 has what both need.
+# This module uses private members of the learner of Stable-Baselines3.
 # pyright: reportPrivateUsage=false, reportMissingTypeStubs=false
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ except ImportError as error:
 
 # The group of observations that actor and critic read.
 GROUP: Final = "policy"
-# Stable-Baselines3's, for both.
+# Values of Stable-Baselines3, which both learners use.
 _VALUE_WEIGHT: Final = 0.5
 _LONGEST_GRADIENT: Final = 0.5
 _ADAMS_EPSILON: Final = 1e-5
@@ -262,11 +262,11 @@ class RslTraining:
         self._returns = _Returns(envs.num_envs, device, self._statistics, settings.gamma)
 
     def _networks(self, seen: TensorDict) -> tuple[Any, Any]:
-        """Return an actor and a critic of the shapes of the model's."""
+        """Return an actor and a critic of the same shapes as the model's."""
         groups = {"actor": [GROUP], "critic": [GROUP]}
         shape: dict[str, Any] = {
             "hidden_dims": self._settings.net_arch,
-            "activation": "tanh",  # Stable-Baselines3's.
+            "activation": "tanh",  # As in Stable-Baselines3.
             "obs_normalization": self._settings.normalise,
         }
         actor = cast("Any", MLPModel)(

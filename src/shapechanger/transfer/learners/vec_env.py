@@ -46,7 +46,7 @@ class ThreadVecEnv(DummyVecEnv):
             **arguments,
         )
         self.envs = self._envs.envs
-        # Skips DummyVecEnv's, which would make its own envs and buffers.
+        # Skips the constructor of DummyVecEnv, which would make its own envs and buffers.
         cast("Any", VecEnv).__init__(
             self, num_envs, self._envs.single_observation_space, self._envs.single_action_space
         )

@@ -78,7 +78,7 @@ class LimbModel(MLPModel):
     """A network of a policy of limbs as rsl-rl's actor or critic."""
 
     def __init__(self, policy: LimbPolicy, net: nn.Module, *, acts: bool) -> None:
-        # Skips MLPModel's, which builds a network.
+        # Skips the constructor of MLPModel, which would build its own network.
         nn.Module.__init__(self)
         self.obs_groups, self.obs_normalization = [GROUP], False
         self.obs_normalizer = nn.Identity()

@@ -35,7 +35,7 @@ def _layers(*widths: int) -> nn.Sequential:
 
 
 class LimbNetwork(nn.Module):
-    """From rows of a trunk and any number of limbs to one number a limb, or to one in all."""
+    """Network that maps the rows of a body to a number per limb, or to a single number."""
 
     def __init__(self, width: int, *, per_limb: bool) -> None:
         super().__init__()

@@ -24,7 +24,8 @@ _Floats = NDArray[np.float64]
 NUMBERS: Final = 22
 """Columns of a row for the numbers that describe a trunk or a limb."""
 DESCRIBED: Final = 2 + NUMBERS
-"""Columns of a row before the sensed ones: it exists, it has a motor, and the numbers."""
+"""Columns of a row before the observations: whether the limb exists, whether it has a motor, and
+`NUMBERS`."""
 # Brings each number of a row to about 1: runners turn their joints at about 10 rad/s and move at 3
 # m/s. Contact forces are clipped to 1 by the envs.
 _SCALES: Final = {"rad/s": 0.1, "m/s": 0.3}
@@ -100,7 +101,7 @@ class LimbRows:
 
     @staticmethod
     def stacked(each: Sequence[LimbRows]) -> LimbRows:
-        """Return the rows of bodies with numbers in one order, whose observations are stacked."""
+        """Stack the maps of bodies whose observations have the same order, one body per row."""
         own = ("scale", "offset", "constant", "low", "high")
         return replace(
             each[0], **{name: np.stack([getattr(rows, name) for rows in each]) for name in own}

@@ -138,7 +138,7 @@ class MethodRun:
         Args:
             policy: The policy.
         """
-        if self.identity and hasattr(policy, "carded"):  # It has a card.
+        if self.identity and hasattr(policy, "carded"):  # Only policies with a card have a version.
             policy = policy.carded(identity={**policy.card.identity, **self.identity})
         policy.save(self.policy_file)
 
@@ -162,7 +162,7 @@ class Method:
         uses_source: Whether it has cost source steps, which count in total steps.
         trains: Whether it trains a policy, which `learn` returns.
         learns_on_target: Whether it learns on the target, so that it has a learning curve there.
-        needs: What the learner must take, with words for learners that do.
+        needs: What the learner must have in `takes`, each with a description of such a learner.
         one_family: Whether source and target must be bodies of one family.
     """
 

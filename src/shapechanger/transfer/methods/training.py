@@ -53,7 +53,7 @@ class FrozenTrunk(Method):
 
 
 class _AtStart(BaseCallback):
-    """Acts before the first step only."""
+    """Base class of callbacks that act before the first step only."""
 
     def _on_step(self) -> bool:
         return True

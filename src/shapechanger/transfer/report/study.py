@@ -140,7 +140,7 @@ def argument_text(value: object) -> str:
 
 
 def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str]]:
-    """The gains and the last time that the verdict rests on, by target steps and total steps."""
+    """Return the gains and the time to the last threshold, in target steps and in total steps."""
     rows = [row for row in measures if row.arm == study.headline_arm]
     cards: list[dict[str, str]] = []
     for row in (rows[1], rows[0], rows[2], rows[-1]):

@@ -48,7 +48,7 @@ class FilmStrip(NamedTuple):
 
 
 class Sweep(NamedTuple):
-    """The number in which the targets of a suite differ."""
+    """A property in which the targets of a suite differ, with its value for each target."""
 
     name: str
     values: Mapping[str, float]
