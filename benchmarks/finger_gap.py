@@ -41,17 +41,17 @@ from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 
 # Twenty minutes on a bench; arms are also evaluated after ten.
 STEPS: Final = 61_440
-# Steps of the arms that learn in simulated fingers: with half of them identified reaches 85 %.
+# Steps of the arms that learn in simulated fingers; with half as many, `identified` reaches 85 %.
 SIMULATED: Final = 614_400
 RIGS: Final = 5
-# On a rig half of them are enough.
+# On a rig, half as many are enough.
 RIG_SIMULATED: Final = 307_200
-# Two minutes on a bench, where only arms are compared that do not learn there.
+# Two minutes on a bench, for a comparison of arms that do not learn on the target.
 FOLLOW_STEPS: Final = 6144
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 # Zero-shot success below this counts as a gap.
 _MILD: Final = 0.5
-# Success that is asked of arms: on a rig's twin, in process, and after twenty minutes of tuning.
+# Required success: on a rig's twin, in process, and after twenty minutes of fine-tuning.
 _RECOVERED: Final = 0.8
 _RECOVERED_IN_GAP: Final = 0.9
 _TUNED: Final = 0.7
@@ -77,10 +77,10 @@ Shipped = Literal["reach", "track"]
 
 
 def gap() -> list[Row]:
-    """Measure the success of each arm on fingers of the gap "real-like", and what makes the gap.
+    """Measure each arm's success on fingers of the gap "real-like", and the causes of the gap.
 
-    The shipped policy in the nominal finger with a delay shows what a delay alone costs, and a
-    policy of the nominal finger on the rig's motors what the other moment arms and joints cost.
+    The shipped policy in the nominal finger with a delay shows the cost of a delay alone. A policy
+    of the nominal finger with a rig's motors shows the cost of other moment arms and joints.
     `ONLY` names arms besides scratch and zero-shot, or "rig" for that policy. With `ENDED=1` no run
     is started, and the rows cover the runs that have ended.
     """

@@ -24,8 +24,8 @@ from shapechanger.finger.task import fingertip, fingertip_jacobian
 from shapechanger.finger.tensions import drive_of, tensions_for_torque
 from shapechanger.transfer.learners.evaluation import evaluation_seed
 
-# With a larger gain, 1/s, a finger on a rig's path of commands oscillates; a smaller one, 6, leaves
-# it on its way after 2 s.
+# Gain of the controller, 1/s. With a larger gain, a finger with a rig's command path oscillates;
+# with 6, it has not yet arrived after 2 s.
 _GAIN: Final = 12.0
 # Units in which the solver's numbers are near 1: errors of 1 cm, tensions of 10 N, torques of
 # 10 mN·m.
@@ -51,7 +51,7 @@ _REPLACED: Final = {
     " without noise": _nominal("joint_noise", "tension_noise"),
     " without delay": _nominal("command_delay"),
     " with stiff tendons": _nominal("tendon_stiffness", "backlash"),
-    # Without any, the controller oscillates.
+    # Not without friction, because the controller would oscillate.
     " with the least friction of the gap": {"tendon_friction": _RIG.tendon_friction[0]},
     " with the nominal finger's tensions": _nominal("most_tension", "least_tension"),
     " with the nominal finger's moment arms": _nominal("moment_arms"),
@@ -97,7 +97,7 @@ class Statics:
             target: Place of the fingertip, m, (3,).
         """
         distance, angles = self._nearest(target, self._low, self._high)
-        for _ in range(2):  # The place decides which tendons shorten, and these the place.
+        for _ in range(2):  # Which tendons shorten, and so lose force, depends on the result.
             lost = self._friction * np.sign(self._arms @ (angles - JOINT_REST))
             distance, angles = self._nearest(target, self._low - lost, self._high - lost)
         return distance

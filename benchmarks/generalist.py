@@ -38,13 +38,13 @@ COMMAND: Final = "python -m benchmarks.run generalist"
 SEEDS: Final = 5
 BODIES: Final = 32
 STEPS: Final = 1_048_576
-# What one of the bodies has had, and so a fair budget for a body's own scratch.
+# Steps that the policy learns in each body, and the budget of a policy of a single body.
 SHARE: Final = STEPS // BODIES
 SCRATCH_BODIES: Final = 8
 ANT: Final = EnvRef("shapechanger/Ant-v1")
 EXTENDED: Final = EnvRef("shapechanger/ExtendedAnt-v1")
 SPLITS: Final = ("train", "interpolation", "extrapolation", "composition")
-# Other ants of that split: the first draw was known when the rows were designed.
+# A second draw of the split "extrapolation", because the first one was known during the design.
 AGAIN: Final = "extrapolation, second draw"
 _RESAMPLES: Final = 4000
 
@@ -248,7 +248,7 @@ def _scratch(split: str) -> list[float]:
 
 
 def _scratch_row(found: list[Scores], split: str, alone: list[float]) -> Row:
-    """Return what some bodies learn alone in one body's share of the steps."""
+    """Return the speed of policies that learn in one body each, with that body's share of steps."""
     limbs = np.array(
         [one.splits[split][:SCRATCH_BODIES] for one in found if one.network == "limbs"]
     )

@@ -48,27 +48,27 @@ FEW: Final = 64
 STEPS: Final = 100
 SPEED: Final = 300_000
 ANT: Final = EnvRef("shapechanger/Ant-v1")
-# Of the training: as many passes over as many steps as those of `ppo-run`, in 8 times as many
-# worlds, each for a quarter of the steps.
+# Settings of the training. Compared with `ppo-run`, an update has 8 times as many worlds with a
+# quarter of the steps each; the number of passes is the same.
 TRAINING: Final = 1_048_576
 LONGEST_S: Final = 60
 TRAINING_SETTINGS: Final = {"n_envs": 512, "n_steps": 32}
-# Of one policy in many bodies.
+# Settings of the training of one policy in many bodies.
 GENERALIST: Final = 100_000_000
 GENERALIST_BODIES: Final = {"count": 256, "seed": 0}
 GENERALIST_SETTINGS: Final = {"n_envs": 2 * MANY, "n_steps": 24, "batch_size": 49_152}
 GENERALIST_FILE: Final = Path("benchmarks", "results", "generalist-gpu.safetensors")
-# Seconds of its evaluations and of the making of its bodies, and the part of the rest that it may
-# plan for.
+# Seconds for evaluations and for making the bodies, and the fraction of the remaining time that the
+# training may use.
 ASIDE_S: Final = 40
 CAREFUL: Final = 0.93
-# Of the ratios.
+# Rounds and targets of the ratios.
 ROUNDS: Final = 15
 DEAREST: Final = 1.1
 CAPTURED: Final = 3.0
 CONSTRUCTION_S: Final = 1.0
-# Single precision and contacts in another order let trajectories drift apart; the first step does
-# not. Tolerance of the exam of the tests, relative to 1 + the number.
+# Tolerance of the first step, relative to 1 + the number, as in the tests. Later steps may differ
+# more: with single precision and another order of contacts, trajectories drift apart.
 PARITY: Final = 2e-4
 TASKS: Final = ("Ant", "HalfCheetah", "InvertedDoublePendulum", "Humanoid", "Finger")
 
@@ -82,7 +82,7 @@ def gpu() -> Iterator[Row]:
 
 
 def on_cpu() -> Iterator[Row]:
-    """Measure on Warp's CPU device what it can show."""
+    """Measure the ratios that are meaningful on Warp's CPU device."""
     if GPU:
         sys.exit("This machine has a GPU: run `python -m benchmarks.run gpu`.")
     yield from _all(graphs, construction, differing)
@@ -208,7 +208,7 @@ def speed() -> Iterator[Row]:
     target = f">= {SPEED:,}"
     envs = made("Ant", MANY, task_infos=False)
     step = _stepper(envs, actions(envs, 50))
-    _seconds(step, STEPS)  # Until worlds restart at different times.
+    _seconds(step, STEPS)  # Warm up: afterwards worlds restart at different times.
     rates = sorted(MANY / _seconds(step, STEPS) for _ in range(5))
     value = statistics.median(rates)
     spread = f"{rates[0]:,.0f} to {rates[-1]:,.0f} in {len(rates)} rounds, {_card()}"
@@ -369,7 +369,7 @@ def training() -> Iterator[Row]:
     """Measure a training with PPO, and what it has learned."""
     name = f"Ant: seconds of PPO with rsl-rl for {TRAINING:,} steps on a GPU"
     target = f"< {LONGEST_S}"
-    # Until its kernels are compiled.
+    # Compile the kernels first.
     _trained("rsl-ppo", TRAINING_SETTINGS, ANT, math.prod(TRAINING_SETTINGS.values()))
     _, seconds, speeds = _trained("rsl-ppo", TRAINING_SETTINGS, ANT, TRAINING)
     spread = f"forward speed {speeds[0]:.2f} to {speeds[-1]:.2f} m/s, seed 0, {_card()}"
@@ -381,7 +381,7 @@ def many() -> Iterator[Row]:
     count = GENERALIST_BODIES["count"]
     ends = time.monotonic() + float(os.environ.get("LIMIT", "inf"))
     update = GENERALIST_SETTINGS["n_envs"] * GENERALIST_SETTINGS["n_steps"]
-    # How long an update takes, after one in which kernels are compiled, in few bodies.
+    # Time an update in a few bodies, after one that compiles the kernels.
     few = ANT.having({"bodies": {**GENERALIST_BODIES, "count": 32}})
     times: dict[int, float] = {}
     _trained(

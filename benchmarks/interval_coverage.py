@@ -159,7 +159,7 @@ def measure(case: Case, trials: int, seed: int) -> dict[str, Measured]:
     measured: dict[str, Measured] = {}
     for name, method in METHODS.items():
         low, high = method(arms, scratches, rng)
-        missed = (truth < low) | (truth > high)  # NaN misses nothing.
+        missed = (truth < low) | (truth > high)  # NaN counts as covered.
         width = np.where(np.isnan(high - low), np.inf, high - low)
         measured[name] = Measured(1.0 - float(missed.mean()), float(np.median(width)))
     return measured

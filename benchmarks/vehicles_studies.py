@@ -28,9 +28,8 @@ SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
 # Target time at which fine-tuning is compared with scratch.
 _SECONDS: Final = (15, 30)
-# Collisions per 100 m.
+# Limit of collisions per 100 m, and number of the twelve pairs that should stay below it.
 FEW: Final = 3.0
-# Out of twelve.
 GOOD: Final = 8
 _ARMS: Final = ("scratch", "fine-tune", "rehearsal")
 RUNS: Final = Path(__file__).parent / "results" / "vehicles-waypoint-runs.json"
@@ -131,7 +130,7 @@ def keep_runs(pairs: Sequence[Path]) -> None:
 
 
 def _seconds_row(pair: Path) -> Row:
-    """Return how much of the target's driving each arm needs to collide rarely."""
+    """Return the target time that each arm needs until it rarely collides."""
     needed: list[str] = []
     rates: list[str] = []
     for arm in _ARMS:

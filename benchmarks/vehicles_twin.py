@@ -97,7 +97,7 @@ _PERIOD_MS: Final = 50.0
 
 
 def on_board(vehicle: str = "car") -> list[Row]:
-    """Measure policies in process, and on board of a twin in real time, on one core.
+    """Measure policies in process, and on the computer of a twin in real time, on one core.
 
     One is the shipped clone, the other a clone of a tank's driving that gives waypoints. On board a
     collision ends a course, because a person has to put the vehicle back.

@@ -49,19 +49,20 @@ from shapechanger.vehicles.waypoints import as_waypoints
 
 VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3
-COURSES: Final = HELD_OUT[:17]  # Of 30 m: 510 m for each drive.
+COURSES: Final = HELD_OUT[:17]  # Each has 30 m, so a policy drives 510 m.
 OUT: Final = Path("results", "waypoints")
 
 
 class Source(NamedTuple):
-    """What a source is taught in.
+    """Demonstrations of a source policy.
 
     Attributes:
         vehicle: Its vehicle.
         worlds: Its worlds; each gives an equal share of the six minutes.
         randomise: Whether light, textures and the camera's pose are drawn for each episode.
-        labels: "path" for points on the path of the expert that drives by waypoints. Where it
-            drives by steering and throttle: "steering" for what these lead to, or "path nearby".
+        labels: "path" for points on the path of the expert, which drives by waypoints. If the
+            expert drives by steering and throttle: "steering" for the waypoint that these lead to,
+            or "path nearby" for points on the path.
     """
 
     vehicle: str
@@ -80,8 +81,8 @@ SOURCES: Final = {
     "harbour-random-boat": Source("boat", ("harbour",), randomise=True),
     "mixed-boat": Source("boat", ("harbour", FLOODED)),
 }
-OWN: Final = tuple(list(SOURCES)[:4])  # Each is named as its vehicle.
-# Those that see other worlds than their targets.
+OWN: Final = tuple(list(SOURCES)[:4])  # Sources that have the name of their vehicle.
+# Sources that are taught in other worlds than their targets.
 ACROSS: Final = tuple(list(SOURCES)[4:])
 # Two clones of the same images, whose labels differ.
 BY_STEERING: Final = {

@@ -50,17 +50,17 @@ class TurnHinge(Edit, frozen=True):
 
 
 def main(steps: int = 200) -> None:
-    """Step an ant with turned ankles, and prove what is different about it."""
+    """Step an ant with turned ankles, and print a certificate of the differences."""
     body = (TurnHinge("ankle_*", math.radians(40.0)),)
     print(to_json(body))
-    assert from_json(to_json(body)) == body  # So studies and worker processes can have it.
+    assert from_json(to_json(body)) == body  # Studies and worker processes store bodies as JSON.
     with (
         gym.make("shapechanger/Ant-v1") as plain,
         gym.make("shapechanger/Ant-v1", body=body) as env,
     ):
         inner: Any = env.unwrapped
         print(inner.certify_shift(plain, env))
-        # The body halfway, at a reset.
+        # Reset to the body halfway between the two.
         env.reset(seed=0, options={"body": interpolate((), body, 0.5)})
         print("halfway:", inner.model.joint("ankle_1").axis.round(3))
         env.action_space.seed(0)

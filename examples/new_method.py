@@ -1,7 +1,7 @@
 # /// script
 # dependencies = ["shapechanger[sim,learn,report,cli]"]
 # ///
-"""A transfer method of one's own, compared with scratch and fine-tuning on two poles.
+"""A custom transfer method, compared with scratch and fine-tuning on two poles.
 
 It freezes everything but the last layer. With the installed command, from this folder:
 

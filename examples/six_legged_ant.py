@@ -16,20 +16,20 @@ from shapechanger import AddLimb, BodyMap, Cut
 from shapechanger.envs.ant import AntEnv
 from shapechanger.morphology.families import BodyLike, Family, length_axes, strength_axes
 
-# The legs of the ant point to 45, 135, 225 and 315 degrees: two more, to 0 and 180.
+# The legs of the ant point to 45, 135, 225 and 315 degrees. The two new legs point to 0 and 180.
 SIX_LEGS = (
     AddLimb("front_left_leg", "_5", math.radians(-45.0)),
     AddLimb("front_right_leg", "_6", math.radians(45.0)),
 )
-# Of a copy, all names get the suffix.
+# All names of a copied leg get the suffix.
 SHANKS = ("shank_1", "shank_2", "shank_3", "shank_4", "shank_1_5", "shank_2_6")
 
 SIX_LEGGED = Family(
     name="SixLeggedAnt",
     bodies={"SixLeggedAnt": (), "FiveAndAHalf": (Cut("shank_1_5", 0.5),)},
-    rig=SIX_LEGS,  # What all its bodies have, before their own edits.
+    rig=SIX_LEGS,  # Edits that all bodies of the family have, before their own.
     bodies_by_joint={f"ankle_{leg}": f"shank_{leg}" for leg in (1, 2, 3, 4)},
-    # What `Family.sample`, `train --bodies` and the arm `generalist` draw from.
+    # Axes along which `Family.sample`, `train --bodies` and the arm `generalist` draw bodies.
     axes=length_axes(SHANKS, 0.6, 1.5) + strength_axes("torso"),
 )
 

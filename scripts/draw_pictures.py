@@ -1,8 +1,8 @@
 """Draw the clips of gallery and docs, and the strip of the README: `make gallery`.
 
-`python scripts/draw_pictures.py --only driving` draws one of them, and `--out FOLDER` writes
-elsewhere than to docs/pictures. From one ant to another trains for some minutes first, in
-results/gallery; where that study has ended, it is only drawn.
+`python scripts/draw_pictures.py --only driving` draws one of them, and `--out FOLDER` writes to
+another folder than docs/pictures. The clip of transfer between ants first runs a study of a few
+minutes in results/gallery, unless the study is there already.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _bodies(
 ) -> list[Panel]:
     """Film the reference policies of bodies, each group at one scale.
 
-    It keeps so many rows of pixels, below which is nothing to see, and views from farther away than
+    Frames are cropped to the upper `rows`, because nothing is visible below. `farther` multiplies
     the distance at which a body fills the frame.
     """
     panels: list[Panel] = []
@@ -206,7 +206,7 @@ def _photograph_transfer(path: Path) -> None:
 
 
 def _photographed(ref: EnvRef, policy: Any) -> tuple[Picture, float]:
-    """Return a multiple exposure of an ant that walks past a fixed camera, and its way, m."""
+    """Return a multiple exposure of an ant that walks past a fixed camera, and its progress, m."""
     wide, high = _STRIP
     view = {"lookat": np.array([_STRIP_M / 2 - 2.0, 0.0, 0.4]), "distance": _AWAY_M}
     env = _made(ref, {**view, "azimuth": 90.0, "elevation": -6.0}, (2 * wide, 2 * high))

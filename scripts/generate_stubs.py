@@ -2,8 +2,8 @@
 
 `make check` runs it after each installation. pybind11-stubgen reads the signatures out of the
 compiled modules, and `_CORRECTIONS` state what it cannot know; the modules of MuJoCo that are
-Python have stubs written by hand next to the generated ones. What is None only where nothing fits,
-such as the parent of the world or a body looked up by a wrong name, is `X | Any`: both
+Python have stubs written by hand next to the generated ones. Results that are rarely None, such as
+the parent of the world or a body looked up by a wrong name, have the type `X | Any`, so that both
 `body.parent.name` and `body.parent is None` pass.
 """
 

@@ -31,7 +31,7 @@ MOTORS: Final = "V MOTOR"
 BATTERY: Final = "BATTERY"
 ENABLE: Final = "ENABLE"
 DIVIDER: Final = "DIVIDER"
-"""In place of a pull resistor: 1 kOhm lies in the wire, and 2 kOhm between pin and ground."""
+"""Voltage divider instead of a pull resistor: 1 kOhm in the wire, and 2 kOhm from pin to ground."""
 
 
 class Terminal(NamedTuple):

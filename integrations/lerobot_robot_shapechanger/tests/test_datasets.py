@@ -50,7 +50,7 @@ def smooth_drive(data: Path, count: int, hz: float, *, rewarded: bool = True) ->
 @pytest.mark.parametrize("hz", [20.0, 12.5])
 @pytest.mark.parametrize("images", [False, True])
 def test_lerobot_reads_an_export(tmp_path: Path, images: bool, hz: float) -> None:
-    """Every frame, state, action, reward, time and task; and windows over several steps."""
+    """LeRobot reads all frames, states, actions, rewards, times and tasks, and windows of steps."""
     for count in (30, 12):
         smooth_drive(tmp_path / "data", count, hz)
     export_recording(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=images)
@@ -86,7 +86,7 @@ def test_lerobot_reads_an_export(tmp_path: Path, images: bool, hz: float) -> Non
 
 
 def test_statistics_are_those_of_lerobot(tmp_path: Path) -> None:
-    """Ours, and what LeRobot computes from the same numbers and images as one episode."""
+    """Our statistics equal LeRobot's of the same numbers and images in one episode."""
     for count in (30, 12):
         smooth_drive(tmp_path / "data", count, 20.0)
     export_recording(tmp_path / "data", tmp_path / "set", "lerobot", images=True)
@@ -111,7 +111,7 @@ def test_statistics_are_those_of_lerobot(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["video", "image", "none"])
 def test_we_read_what_lerobot_writes(tmp_path: Path, kind: str) -> None:
-    """Steps, names, tasks and the chosen one of two cameras."""
+    """Steps, names, tasks and the selected one of two cameras are imported."""
     names = ["pan.pos", "tilt.pos"]
     features: dict[str, Any] = {
         "action": {"dtype": "float32", "shape": (2,), "names": names},
@@ -167,7 +167,7 @@ def test_we_read_what_lerobot_writes(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("images", [False, True])
 def test_lerobot_continues_an_export(tmp_path: Path, images: bool) -> None:
     """LeRobot adds an episode to ours; without our own file, both are imported."""
-    # LeRobot 0.4.4 cannot add a number of 32 bits that is no part of a vector.
+    # LeRobot 0.4.4 cannot add a single number of 32 bits that is not in a vector.
     smooth_drive(tmp_path / "data", 5, 20.0, rewarded=False)
     export_recording(tmp_path / "data", tmp_path / "set", "lerobot", task="A.", images=images)
     resume = getattr(LeRobotDataset, "resume", LeRobotDataset)  # The former in 0.6.

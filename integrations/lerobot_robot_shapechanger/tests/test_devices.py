@@ -67,7 +67,7 @@ def tin(tmp_path: Path) -> Iterator[Callable[..., Robot]]:
 
 
 def test_features_are_those_of_the_layouts(robot: RunningRobot) -> None:
-    """They are known before `connect`, and observations have exactly these."""
+    """Features are known before `connect`, and observations have exactly these features."""
     car = lab_car()
     assert car.action_features == {"steering": float, "throttle": float}
     assert car.action_features == console().action_features
@@ -157,7 +157,7 @@ def test_actions_are_checked(robot: RunningRobot) -> None:
 
 @pytest.mark.parametrize("make", [lab_car, console])
 def test_a_robot_needs_its_name(robot: RunningRobot, make: Callable[[], Any]) -> None:
-    """A wrong name shows the nearest; a missing one shows all."""
+    """The error for a wrong name suggests the nearest name; for a missing one it lists all."""
     device = make()
     wrong = type(device)(device.config_class(id="lab-cra"))
     with pytest.raises(UnknownName, match=r"'lab-cra'\. Did you mean 'lab-car'"):
@@ -167,7 +167,7 @@ def test_a_robot_needs_its_name(robot: RunningRobot, make: Callable[[], Any]) ->
 
 
 def test_only_a_person_arms_a_robot_that_says_so(tin: Callable[..., Robot]) -> None:
-    """LeRobot does not drive before that, and gives up in a sentence."""
+    """LeRobot does not drive before a person arms the robot, and gives up with one sentence."""
     fake = tin(arming="person")
     car = Shapechanger(ShapechangerConfig(id="tin", wait_s=0.2))
     with pytest.raises(RobotRefused, match=r"After 0.2 s, tin waits for a person: run .* with P"):
@@ -185,7 +185,7 @@ def test_only_a_person_arms_a_robot_that_says_so(tin: Callable[..., Robot]) -> N
 def test_what_nothing_measures_is_no_nan(
     tin: Callable[..., Robot], caplog: pytest.LogCaptureFixture
 ) -> None:
-    """It is the middle of its range, or 0 where that is infinite, and is logged once."""
+    """A missing measurement is the middle of its range, or 0 if that is infinite; it is logged."""
     tin(absent=("collision", "battery"))
     with Shapechanger(ShapechangerConfig(id="tin")) as car:
         seen = [car.get_observation() for _ in range(3)][-1]
@@ -195,7 +195,7 @@ def test_what_nothing_measures_is_no_nan(
 
 
 def test_a_robot_without_a_camera(tin: Callable[..., Robot]) -> None:
-    """It has a state alone."""
+    """A robot without a camera has only a state."""
     tin(image_size=None)
     with Shapechanger(ShapechangerConfig(id="tin")) as car:
         assert car.cameras == {}
@@ -204,7 +204,7 @@ def test_a_robot_without_a_camera(tin: Callable[..., Robot]) -> None:
 
 
 def test_a_camera_without_a_picture_is_named(tin: Callable[..., Robot]) -> None:
-    """`connect` does not wait for it longer than for a person."""
+    """`connect` waits for an image no longer than for a person."""
     tin(jpeg=b"no picture")
     car = Shapechanger(ShapechangerConfig(id="tin", wait_s=0.2))
     with pytest.raises(RobotRefused, match="sends no picture"):
@@ -212,7 +212,7 @@ def test_a_camera_without_a_picture_is_named(tin: Callable[..., Robot]) -> None:
 
 
 def test_a_twin_whose_time_moves_in_steps_is_refused(tin: Callable[..., Robot]) -> None:
-    """LeRobot follows the clock."""
+    """A twin that is stepped is refused, because LeRobot runs in real time."""
     tin(clock="twin")
     for device in (
         Shapechanger(ShapechangerConfig(id="tin")),

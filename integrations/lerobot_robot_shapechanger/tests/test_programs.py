@@ -154,7 +154,7 @@ def test_an_unplugged_robot_ends_teleoperation(monkeypatch: pytest.MonkeyPatch) 
 def test_an_unplugged_robot_costs_one_episode(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The episodes before it are a dataset."""
+    """A dataset has the episodes that were completed before the robot was unplugged."""
     dataset = DatasetRecordConfig(
         repo_id="tests/drive",
         single_task="Drive ahead.",
