@@ -36,7 +36,7 @@ class TurnHinge(Edit, frozen=True):
             raise MorphologyError(f"An angle must be finite, got {self.angle}.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Turn every hinge that fits; `amount` is the share of the change that is made."""
+        """Turn every hinge that matches; `amount` is the share of the change that is made."""
         turn = self.amount * self.angle
         matrix = np.array(
             [

@@ -185,7 +185,7 @@ def _part(
         chosen.append(step)
         if newest is None:
             continue
-        if newest == decoded:  # The frame is also of the step before.
+        if newest == decoded:  # The previous step has the same frame.
             pictures.append(pictures[-1])
             continue
         decoded, where = newest, f"{name}/{step.frame or step.index}"

@@ -278,7 +278,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 
         qpos = bound.qpos
         x, y, z, _, up_x, up_y = qpos[:6].tolist()
-        # A sum is finite only if every number is; one that is not may have overflowed.
+        # A finite sum proves that all numbers are finite; an infinite sum may be an overflow.
         finite = math.isfinite(sum(observation[: bound.state_size].tolist()) + x + y) or bool(
             np.isfinite(qpos).all() and np.isfinite(bound.qvel).all()
         )

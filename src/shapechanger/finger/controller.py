@@ -109,8 +109,8 @@ _WAVES: Final = 4
 _SPREAD: Final = 1.5
 # Distance of the commanded posture from either end of a joint's range, as a fraction of it.
 _MARGIN: Final = 0.05
-# Farthest that the end joint is commanded from where the hood has it, rad: beyond its band, and as
-# far as the tendons are strong enough.
+# Largest commanded distance of the end joint from its position under the hood, rad: beyond its
+# band, but within the strength of the tendons.
 _DIP_OFF: Final = math.radians(20.0)
 # Range of the lowest tension, which varies over time, N: a slack tendon reveals nothing about its
 # arms, and a constant tension nothing about its stretch.

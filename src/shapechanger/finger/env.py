@@ -129,7 +129,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             seed = check_seed(seed, FingerError, "finger_seed must be", largest=None)
             self._use(self._gap.draw(np.random.default_rng(seed)))
         self._senses: FingerSenses | None = None
-        self._change = np.zeros(len(TENDONS))  # Of the command, in the newest step.
+        self._change = np.zeros(len(TENDONS))  # Change of the command in the newest step.
         command = ("1", -1.0, 1.0)
         self.action_layout = Layout(
             tuple(Feature(f"{t}/command", *command, Element("tendon", t)) for t in TENDONS)
@@ -310,7 +310,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return "finger_seed" if self._is_drawn_anew else ""
 
     def randomised_source(self) -> dict[str, Any]:
-        """Arguments with which an env of the finger has other fingers that this one may be."""
+        """Arguments that draw fingers among which this one may be."""
         return {"gap": "wide", "reward": _CALM}
 
     def identified_source(self, seed: int) -> dict[str, Any]:

@@ -36,7 +36,7 @@ from shapechanger.finger.track import FOLLOWS_M, SEEN_S, SETTLING_STEPS, FingerT
 
 _J: Final = len(JOINTS)
 _T: Final = len(TENDONS)
-# Streams of random numbers; those from the last one on are of the measurements of each step.
+# Streams of random numbers; the measurements of step n have the stream `_SENSES + n`.
 _STARTS: Final = 0
 _TARGETS: Final = 1
 _SENSES: Final = 2
@@ -67,11 +67,11 @@ class DeviceFinger(Worlds):
         whole = partial(torch.zeros, self.count, dtype=torch.int64, device=self.device)
         count = self.count
         self._commands, self._change = zeros(count, _T), zeros(count, _T)
-        self._shares = zeros(count, _T)  # Tensions on the path, of their ranges.
+        self._shares = zeros(count, _T)  # Tensions on the command path, 0 to 1.
         self._angles, self._velocities = zeros(count, _J), zeros(count, _J)
         self._senses = zeros(count, 2 * _J + 3 * _T)
         self._seen_tip, self._tip, self._target = zeros(count, 3), zeros(count, 3), zeros(count, 3)
-        self._ahead: Tensor | None = None  # Coming points of a path, m, (n, k, 3).
+        self._ahead: Tensor | None = None  # Next points of the path, m, (n, k, 3).
         self._seeds, self._episodes, self._steps = whole(), whole(), whole()
 
     @override
@@ -322,7 +322,7 @@ def _fingertip(angles: Tensor) -> Tensor:
     return torch.stack(tip_at(cos, sin), dim=1)
 
 
-# A delay this close to a whole number of simulation steps takes one more at some of them.
+# Distance from a whole number of simulation steps within which rounding can add a step to a delay.
 _WHOLE: Final = 1e-6
 
 

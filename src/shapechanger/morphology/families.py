@@ -280,7 +280,7 @@ class Family:
 
         Args:
             values: Value of each axis, by its name.
-            parts: Name of the part at each place that has not the model's own.
+            parts: Name of the part at each place where it replaces the model's own part.
 
         Raises:
             UnknownName: If the family has no such axis, place or part.

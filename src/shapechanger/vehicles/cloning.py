@@ -62,7 +62,7 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
 
     takes = frozenset[Takes]({"demonstrations"})
     learner = f"{__name__}:CloneLearner"
-    last_k = 1  # Each evaluation is of another clone.
+    last_k = 1  # Not a mean, because each evaluation is of a different clone.
     source_steps = 0
 
     def __post_init__(self) -> None:

@@ -76,7 +76,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         learning_rate: Initial learning rate; falls to 0 along half a cosine.
         further_rate: Initial learning rate when another policy is trained further.
         warm_up: Steps in which the rate rises from 0.
-        weight_decay: Of AdamW.
+        weight_decay: Weight decay of AdamW.
         held_out: Share of the steps, in [0, 1), in one stretch, that is used for early stopping
             instead of training.
         checks: Number of validations during training.

@@ -101,7 +101,7 @@ def output_fields(
             "class_names": tuple(named(np.asarray(each), layout) for each in classes),
         }
     low, high = _ranges(both, layout)
-    high = np.where(high > low, high, low + 1.0)  # For a constant value.
+    high = np.where(high > low, high, low + 1.0)  # Avoids an empty range of a constant value.
     return {"low": tuple(low.tolist()), "high": tuple(high.tolist())}
 
 

@@ -260,7 +260,7 @@ def import_recording(
     hz: float | None = None,
     strict: bool = False,
 ) -> Converted:
-    """Import a recording: what is whole, with a report on the rest.
+    """Import the complete records of a recording, and report the others.
 
     Args:
         path: A folder in one of the `formats`; it is not changed.

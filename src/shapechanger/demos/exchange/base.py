@@ -59,7 +59,7 @@ COMMANDS: Final = {
     "throttle": Feature("throttle", "1", -1.0, 1.0),
     **{key: Feature(key, "1", 0.0, 1.0) for key in ("forward", "backward", "right", "left")},
 }
-"""Values of an action by their names in tables of others; a key that is held is 1."""
+"""Values of an action by their names in tables of other programs; a key that is held is 1."""
 
 _MAX_FEATURES: Final = 512  # That values become one by one; more become one array feature.
 _NS_PER_S: Final = 1e9

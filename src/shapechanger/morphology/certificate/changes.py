@@ -23,14 +23,14 @@ from shapechanger.morphology.certificate.numbers import (
 )
 
 _Elements = dict[str, dict[str, Values]]
-_Row = tuple[str, str, float | None, float | None, str]  # As a `Change`, of one number.
+_Row = tuple[str, str, float | None, float | None, str]  # The fields of a `Change` of one number.
 ROUNDING: Final = 1e-9
-"""Part of a field's largest number up to which two numbers are equal. Writing out a total mass,
-another order of a sum and another processor change the last bits, and constants that MuJoCo derives
-lose more."""
+"""Tolerance of equal numbers, relative to the largest number of their field. Writing out a total
+mass, another order of a sum and another processor change the last bits, and constants that MuJoCo
+derives are less exact."""
 _NOISE: Final = 1e-14
-"""The same, as a part of the largest number of this field in the whole model: a zero that was
-computed, as by turning a frame, is not zero."""
+"""The same, relative to the largest number of this field in the whole model: a computed zero, such
+as after turning a frame, is not exactly zero."""
 _ROUNDED_TO: Final = 10  # Digits of the largest number of a field: a half of `ROUNDING` at most.
 # 64 bits: the chance that two of a million different models collide is 1 in 37 million.
 _HEX_DIGITS: Final = 16
@@ -277,7 +277,7 @@ def _digest_of(values: object) -> str:
 
 
 def _rounded(values: Values, scale: float) -> Values:
-    """Round numbers, of a field up to `scale`, to as many digits as all machines agree on."""
+    """Round numbers to the digits that all machines share; `scale` is their field's largest."""
     # Slightly more, so that a number just below a power of ten counts as that power.
     largest = max(_largest(values), _NOISE / 10.0 ** (1 - _ROUNDED_TO) * scale) * (1.0 + ROUNDING)
     places = _ROUNDED_TO - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0

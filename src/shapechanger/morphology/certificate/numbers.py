@@ -93,7 +93,7 @@ KINDS: Final = {
     "keyframes": ("keyframe", "key", _O.mjOBJ_KEY),
     "custom": ("custom number", "numeric", _O.mjOBJ_NUMERIC),
 }
-"""What elements with names are called, the first part of the names of their arrays, their type."""
+"""Title of each kind of named element, the prefix of its arrays in a model, and MuJoCo's type."""
 
 
 def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:

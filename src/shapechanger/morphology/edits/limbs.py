@@ -63,7 +63,7 @@ class Lock(Edit, frozen=True):
     position: float | None = None
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Lock every joint that fits."""
+        """Lock every joint that matches."""
         joints = select("joint", self.joint, spec.joints)
         by: dict[str, float] = {}
         for joint in joints:
@@ -103,7 +103,7 @@ class AddMotor(Edit, frozen=True):
         require_gear(self.gear)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Add a motor to every joint that fits and has none."""
+        """Add a motor to every joint that matches and has none."""
         moved = {each.target for each in spec.actuators if each.trntype in references.OF_JOINTS}
         # This includes models that make two joints follow each other: one of them has a motor.
         couplings = [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT]
@@ -175,7 +175,7 @@ class Cut(Edit, frozen=True):
     keep: Annotated[float, Meta(ge=0.01, le=1.0)]
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Cut every segment that fits."""
+        """Cut every segment that matches."""
         for body in select_limbs(spec, self.body, "cut"):
             geometry.require_geometry(spec, body)
             plane = geometry.Plane(body, self.keep)
@@ -226,7 +226,7 @@ class Remove(Edit, frozen=True):
     body: str
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Remove every limb that fits."""
+        """Remove every limb that matches."""
         for body in select_limbs(spec, self.body, "removed"):
             _take_away(spec, body, self.amount)
 

@@ -44,7 +44,7 @@ class Stretch(Edit, frozen=True):
     axis: Literal["x", "y", "z"] | None = None
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Stretch every body that fits."""
+        """Stretch every body that matches."""
         factor = part_of_the_way(1.0, self.factor, self.amount)
         axis = None if self.axis is None else "xyz".index(self.axis)
         along = factor if axis is None else np.where(np.arange(3) == axis, factor, 1.0)
@@ -70,7 +70,7 @@ class Radius(Edit, frozen=True):
     factor: Ratio
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Thicken every body that fits."""
+        """Thicken every body that matches."""
         factor = part_of_the_way(1.0, self.factor, self.amount)
         for body in _reshaped(spec, self.body, factor):
             for geom in body.geoms:
@@ -121,7 +121,7 @@ class PlaceGeom(Edit, frozen=True):
             )
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every geom that fits."""
+        """Change every geom that matches."""
         for geom in select("geom", self.geom, spec.geoms):
             if geom.parent.parent is not None:
                 geometry.require_geometry(spec, geom.parent)
@@ -162,7 +162,7 @@ class PlaceBody(Edit, frozen=True):
     to: Vector
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Move every body that fits."""
+        """Move every body that matches."""
         for body in select("body", self.body, spec.bodies[1:]):
             body.pos = self._placed(body.pos)
 
@@ -189,7 +189,7 @@ class StartHeight(Edit, frozen=True):
     to: Annotated[float, Meta(ge=-100.0, le=100.0)]
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Raise or lower every trunk that fits."""
+        """Raise or lower every trunk that matches."""
         for body in select("trunk", self.body, spec.worldbody.bodies):
             body.pos = self._raised(body.pos)
 

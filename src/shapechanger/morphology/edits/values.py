@@ -62,7 +62,7 @@ class Mass(ValueEdit, frozen=True):
     to: Annotated[float, Meta(gt=0.0, le=_LARGEST)] | None = None
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every body that fits."""
+        """Change every body that matches."""
         # Only the compiler knows the volume of every shape.
         whole = compiled(spec) if self.to is not None else None
         for body in select("body", self.element, spec.bodies[1:]):
@@ -99,7 +99,7 @@ class Density(ValueEdit, frozen=True):
     """Change the density of all geoms of bodies, kg/m³; masses and inertias follow."""
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every body that fits."""
+        """Change every body that matches."""
         for body in select("body", self.element, spec.bodies[1:]):
             written = any(not math.isnan(geom.mass) for geom in body.geoms)
             if written or geometry.inertia_is_written_out(spec, body):
@@ -128,7 +128,7 @@ class Gear(ValueEdit, frozen=True):
         require_gear(self.to)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every actuator that fits."""
+        """Change every actuator that matches."""
         factors: dict[str, float] = {}
         for actuator in select("actuator", self.element, spec.actuators):
             gear = np.array(actuator.gear)
@@ -195,7 +195,7 @@ class _Resistance(ValueEdit, frozen=True, tag=None):
     """Base class of edits of a joint's linear coefficient, and of higher ones by a scale."""
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every joint that fits."""
+        """Change every joint that matches."""
         field = type(self).__name__.lower()
         for joint in select("joint", self.element, spec.joints):
             if all(number > 0.0 for number in joint.springdamper):
@@ -244,7 +244,7 @@ class Friction(ValueEdit, frozen=True):
             )
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every geom that fits."""
+        """Change every geom that matches."""
         place = ("sliding", "torsional", "rolling").index(self.component)
         for geom in select("geom", self.element, spec.geoms):
             geom.friction[place] = self.changed(float(geom.friction[place]))
@@ -274,7 +274,7 @@ class JointRange(Edit, frozen=True):
             raise MorphologyError(f"The lower limit must be below the upper one, got {self}.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change every joint that fits."""
+        """Change every joint that matches."""
         for joint in select("joint", self.joint, spec.joints):
             if (old := geometry.limits(joint)) is None:
                 if self.lower is None or self.upper is None:

@@ -73,7 +73,7 @@ def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
 
 
 def select_limbs(spec: mujoco.MjSpec, pattern: str, change: str) -> Iterator[mujoco.MjsBody]:
-    """Yield the bodies that match and are there still, since a change may remove others.
+    """Yield the bodies that match, except those that the change has removed in the meantime.
 
     The change, such as "cut", is for the message that refuses a trunk: a body on the world, which
     carries the whole robot.
@@ -137,7 +137,7 @@ def unique_namer(taken: Iterable[str], numbered: str = "_{}") -> Callable[[str],
 
 
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a copy in which every body stands for itself, in its own frame."""
+    """Compile a copy without merging, realigning or discarding any body or geom."""
     copy = spec.copy()
     copy.compiler.fusestatic = copy.compiler.alignfree = copy.compiler.discardvisual = False
     return copy.compile()

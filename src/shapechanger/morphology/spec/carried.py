@@ -175,7 +175,7 @@ def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
 
 
 def _follow_tendons(spec: mujoco.MjSpec, tendons: dict[str, _Tendon]) -> None:
-    """Refuse paths that mean something else now, and fit muscles to their new lengths."""
+    """Refuse tendons whose path has changed its meaning, and fit muscles to their new lengths."""
     new = _tendons(compiled(spec))
     for name, now in new.items():
         old = tendons.get(name, now)

@@ -1,7 +1,7 @@
 """References between the elements of a model, and the one rule for edits that touch them.
 
-An edit carries along, or refuses in a sentence, whatever names an element that it touches. Points
-that loops hold are sites meanwhile, and keyframes are kept by name (`carried`).
+An edit updates every reference to an element that it changes, or refuses with one sentence. During
+an edit, pins of loops are sites, and values of keyframes are keyed by name (`carried`).
 """
 
 from __future__ import annotations

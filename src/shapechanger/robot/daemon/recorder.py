@@ -79,7 +79,7 @@ class Worker:
 
 
 class _Episode:
-    """An episode, which the recorder's thread writes; a full one is continued in another one."""
+    """An episode that the recorder's thread writes; a full episode is continued in a new one."""
 
     def __init__(self, folder: Path, header: EpisodeHeader, starter: Client) -> None:
         self.starter = starter

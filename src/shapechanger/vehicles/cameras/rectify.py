@@ -28,11 +28,11 @@ _HORIZON: Final = 22.0
 HALF_WIDTH_RAD: Final = math.atan(0.5 * CANONICAL_SIZE[0] / _FOCAL)
 """Bearing of the left and right edge of a rectified image, rad."""
 
-_SAMPLES: Final = 3  # In each direction of a pixel.
+_SAMPLES: Final = 3  # Samples of a pixel in each direction.
 _NEAREST: Final = 1e-3  # Depth of a ray below which it points sideways or behind the camera.
-_MOST_MISSING: Final = 0.15  # Share of the pixels.
+_MOST_MISSING: Final = 0.15  # Largest share of the view's pixels that a camera may miss.
 
-# Vertical fields of view from which the search for the camera's own begins, degrees.
+# Vertical fields of view at which the search for the camera's field of view starts, degrees.
 _FIRST_FOVY_DEG: Final = (30.0, 48.0, 70.0, 100.0)
 # Standard deviations beyond which an image of a board does not tell the camera's geometry.
 _PITCH_SD_DEG, _FOVY_SD_DEG = 1.0, 2.5

@@ -100,8 +100,8 @@ def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
 def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
     """Return steering and throttle, (2,), that move a standing vehicle unless the throttle is 0.
 
-    A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest:
-    the vehicle would stand for good. In training, exploration moved it.
+    A teacher takes its mean action, and a mean throttle near 0 does not overcome static friction:
+    the vehicle would never move again. In training, exploration moved it.
     """
     steering, throttle = action
     if not stands or throttle == 0.0 or abs(throttle) >= LEAST_THROTTLE:
