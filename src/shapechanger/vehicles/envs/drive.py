@@ -175,20 +175,20 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         EzPickle.__init__(env, *arguments, **options)
         return env
 
-    def _set_up(
+    def __init__(
         self,
         robot: SimulatedRobot,
         vehicle: str,
-        world: str | None,
-        courses: Courses,
         reward: Mapping[str, float],
         *,
-        randomise: bool,
-        put_back: bool,
         has_camera: bool,
-        render_mode: str | None,
         coarse: bool = False,
+        world: str | None = None,
+        courses: Courses = "training",
+        randomise: bool = False,
+        put_back: bool = False,
         lenses: Sequence[str] = (),
+        render_mode: str | None = None,
     ) -> None:
         """Open the world, and set what all views of it have; see their arguments."""
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
@@ -197,8 +197,8 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self._seeds, self._randomise = _course_seeds(courses), randomise
         self.world = MujocoWorld(
             vehicle, world, self._seeds[0], size=robot.size if has_camera or render_mode else None,
-            pitch_deg=robot.camera_pitch_deg, fovy_deg=robot.camera_fovy_deg, lenses=lenses,
-            coarse=coarse,
+            pitch_deg=robot.camera_pitch_deg, fovy_deg=robot.camera_fovy_deg, coarse=coarse,
+            lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )  # fmt: skip
         self.parts = frozenset(output.part for output in robot.plan.outputs)
         ends = {"collision_ends_episode": 0.0} if put_back else {}

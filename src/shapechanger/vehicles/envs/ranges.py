@@ -165,37 +165,31 @@ class RangesEnv(DriveEnv):
 
     Args:
         vehicle: As in `VehicleEnv`, with its errors.
-        world: As in `VehicleEnv`.
         robot: As in `VehicleEnv`.
         reward: Weights that replace the default ones, keyed by name; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default
             is 48 training courses, which are laid out once.
-        put_back: Whether to put the vehicle back on the lane after a collision, where its bumper's
-            reflex keeps it from going forward for 0.75 s.
-        randomise: As in `VehicleEnv`.
         camera: Whether `world.picture()` shows the images of the profile's camera.
-        render_mode: As in `VehicleEnv`.
+        **task: `world`, `randomise`, `put_back`, `lenses` and `render_mode` of `VehicleEnv`. After
+            a collision with `put_back`, the bumper's reflex keeps the vehicle from going forward
+            for 0.75 s.
     """
 
     def __init__(
         self,
         vehicle: str,
         *,
-        world: str | None = None,
         robot: str | os.PathLike[str] | None = None,
         reward: Mapping[str, float] | None = None,
         courses: Courses = _COURSES,
-        randomise: bool = False,
-        put_back: bool = False,
         camera: bool = False,
-        render_mode: str | None = None,
+        **task: Any,
     ) -> None:
         profile = simulated_robot(vehicle, robot)
-        self._set_up(
-            profile, vehicle, world, courses, {"collision": COLLISION_REWARD, **(reward or {})},
-            randomise=randomise, put_back=put_back, has_camera=camera, render_mode=render_mode,
-            coarse=True,
-        )  # fmt: skip
+        weights = {"collision": COLLISION_REWARD, **(reward or {})}
+        super().__init__(
+            profile, vehicle, weights, has_camera=camera, coarse=True, courses=courses, **task
+        )
         self._plan = profile.plan
         self._ticks = round(self._plan.tick_hz / profile.control_hz)
         self._period_s = 1.0 / profile.control_hz

@@ -10,7 +10,6 @@ import math
 from typing import Any
 
 import gymnasium as gym
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,64 +21,33 @@ from shapechanger.vehicles.world import MujocoWorld
 _HALF, _THROTTLE, _STEERING = 20, 0.5, -0.5
 
 
-class VehicleShift(msgspec.Struct, frozen=True):
-    """Differences between a source and a target vehicle.
+def certify_vehicles(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> str:
+    """Compare two vehicles, wrappers included, and return the certificate of their shift.
 
-    Attributes:
-        source: Id of the source.
-        target: Id of the target.
-        changes: Differences of the vehicles, places and cameras, one sentence each.
-        answers: Differences of the rollouts with the same commands, one sentence each.
-        is_empty: Whether the rollouts gave the same frames, places and rewards.
-    """
-
-    source: str
-    target: str
-    changes: tuple[str, ...]
-    answers: tuple[str, ...]
-    is_empty: bool
-
-    def __str__(self) -> str:
-        """Return the certificate as text."""
-        lines = [f"{self.source} -> {self.target}"]
-        for title, sentences in (("Changes", self.changes), ("Rollout", self.answers)):
-            if sentences:
-                lines += [f"{title}:", *(f"  {sentence}" for sentence in sentences)]
-        return "\n".join(lines)
-
-
-def certify_vehicles(
-    source: gym.Env[Any, Any],
-    target: gym.Env[Any, Any],
-    *,
-    seed: int = 0,
-    allow_empty: bool = False,
-) -> VehicleShift:
-    """Compare two vehicles, wrappers included, and certify the shift between them.
-
-    Both are reset and stepped, and left in the middle of an episode. With `allow_empty`, a shift
-    without differences is certified too.
+    It lists the differences of their properties, and of rollouts with the same commands. Both are
+    reset and stepped, and left in the middle of an episode.
 
     Raises:
         MorphologyError: If one of them is not a vehicle.
-        EmptyShift: If they do not differ and `allow_empty` is false.
+        EmptyShift: If the rollouts give the same frames, places and rewards.
     """
     names = _name(source), _name(target)
     old, new = _facts(source), _facts(target)
-    one, two = _drive(source, seed), _drive(target, seed)
-    is_empty = all(map(np.array_equal, one, two))
-    if is_empty and not allow_empty:
+    one, two = _drive(source), _drive(target)
+    if all(map(np.array_equal, one, two)):
         raise EmptyShift(
             f"{names[0]} and {names[1]} behave the same: {2 * _HALF} steps gave equal frames, "
             "places and rewards, so there is nothing to transfer."
         )
-    changes = tuple(f"{name}: {old[name]} -> {new[name]}" for name in old if old[name] != new[name])
-    return VehicleShift(*names, changes, _answers(source, one, two), is_empty)
+    changes = [f"  {name}: {old[name]} -> {new[name]}" for name in old if old[name] != new[name]]
+    answers = [f"  {sentence}" for sentence in _answers(source, one, two)]
+    head = [f"{names[0]} -> {names[1]}", *(["Changes:"] if changes else [])]
+    return "\n".join([*head, *changes, "Rollout:", *answers])
 
 
-def _drive(env: gym.Env[Any, Any], seed: int) -> tuple[NDArray[np.float64], ...]:
+def _drive(env: gym.Env[Any, Any]) -> tuple[NDArray[np.float64], ...]:
     """Return poses, x, y and heading, (n, 3), rewards, and the first and last observation."""
-    seen, info = env.reset(seed=seed)
+    seen, info = env.reset(seed=0)
     observations, path, rewards = [seen], [info["pose"]], list[float]()
     for step in range(2 * _HALF):
         action = np.array([0.0 if step < _HALF else _STEERING, _THROTTLE], np.float32)
@@ -97,7 +65,7 @@ def _answers(
     source: gym.Env[Any, Any],
     one: tuple[NDArray[np.float64], ...],
     two: tuple[NDArray[np.float64], ...],
-) -> tuple[str, ...]:
+) -> list[str]:
     """Return a sentence on each difference of two rollouts."""
     has_waypoints = hasattr(source.unwrapped, "response")
     aside, forward = ("bearing", "speed") if has_waypoints else ("steering", "throttle")
@@ -119,7 +87,7 @@ def _answers(
             f"their observations from the same seed differ by {gaps[0]:.1f} at the start and "
             f"{gaps[1]:.1f} at the end, mean over all numbers"
         )
-    return tuple(sentences)
+    return sentences
 
 
 def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:

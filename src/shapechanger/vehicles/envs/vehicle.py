@@ -16,7 +16,7 @@ from shapechanger.errors import ProfileError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.vehicles.bodies import vehicle_model
 from shapechanger.vehicles.courses.course import FLOODED
-from shapechanger.vehicles.envs.drive import Courses, DriveEnv, Steering, simulated_robot, space_of
+from shapechanger.vehicles.envs.drive import DriveEnv, Steering, simulated_robot, space_of
 from shapechanger.vehicles.envs.ranges import RangesEnv, leave_rest, observe_ranges
 from shapechanger.vehicles.envs.sensed import SensedVehicle
 from shapechanger.vehicles.envs.shift import certify_vehicles
@@ -109,25 +109,17 @@ class VehicleEnv(DriveEnv):
         self,
         vehicle: str,
         *,
-        world: str | None = None,
         robot: str | os.PathLike[str] | None = None,
         steering: Steering | None = None,
         size: Sequence[int] | None = None,
         image: bool = True,
         state: bool = False,
         reward: Mapping[str, float] | None = None,
-        courses: Courses = "training",
-        randomise: bool = False,
-        put_back: bool = False,
-        lenses: Sequence[str] = (),
-        render_mode: str | None = None,
+        **task: Any,
     ) -> None:
         self.welcome = profile = simulated_robot(vehicle, robot, size, steering)
-        self._set_up(
-            profile, vehicle, world, courses, {**profile.reward, **(reward or {})},
-            randomise=randomise, put_back=put_back, has_camera=image, render_mode=render_mode,
-            lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
-        )  # fmt: skip
+        weights = {**profile.reward, **(reward or {})}
+        super().__init__(profile, vehicle, weights, has_camera=image, **task)
         self._period_ns = round(1e9 / profile.control_hz)
         self._has_image, self._has_state = image, state or not image
         self._state = profile.state_layout
@@ -269,16 +261,13 @@ class WaypointEnv(WaypointView, DriveEnv):
     Args:
         vehicle: As in `VehicleEnv`, with its errors.
         robot: As in `VehicleEnv`.
-        courses: As in `VehicleEnv`.
-        render_mode: As in `VehicleEnv`.
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
             for a boat, so that vehicles differ in their bodies alone.
         sensed: Whether speed and reward are those that the sensors of `VehicleEnv` measure, instead
             of the true ones; its physics takes shorter steps, too.
-        randomise: Whether `reset` samples light, textures and the camera's pose too. Images are
-            warped as if the camera were in its place, so a policy sees the error of the pose.
-        put_back: Whether to put the vehicle back on the lane after a collision. A collision then
-            does not end the episode.
+        **task: `courses`, `randomise`, `put_back`, `lenses` and `render_mode` of `VehicleEnv`.
+            Images are warped as if the camera were in its place, so with `randomise` a policy sees
+            the error of its pose.
 
     Attributes:
         parts: The parts that the robot's outputs move.
@@ -297,20 +286,13 @@ class WaypointEnv(WaypointView, DriveEnv):
         world: str | None = None,
         robot: str | os.PathLike[str] | None = None,
         sensed: bool = False,
-        courses: Courses = "training",
-        randomise: bool = False,
-        put_back: bool = False,
-        render_mode: str | None = None,
+        **task: Any,
     ) -> None:
         body, profile = vehicle_model(vehicle), simulated_robot(vehicle, robot)
         world = world or (FLOODED if body.floats else "corridor")
-        common: dict[str, Any] = {
-            "world": world, "robot": robot, "courses": courses, "randomise": randomise,
-            "put_back": put_back, "render_mode": render_mode,
-        }  # fmt: skip
-        env: DriveEnv = VehicleEnv(vehicle, state=True, **common) if sensed else RangesEnv(
-            vehicle, camera=True, **common
-        )  # fmt: skip
+        task = {"courses": "training", **task, "world": world, "robot": robot}
+        inner = {"state": True} if sensed else {"camera": True}
+        env: DriveEnv = (VehicleEnv if sensed else RangesEnv)(vehicle, **inner, **task)
         self.parts, self.world = env.parts, env.world
         self._see(
             env, profile.path, (profile.camera_pitch_deg, profile.camera_fovy_deg, profile.size),
