@@ -70,12 +70,7 @@ class World(Protocol):
     """A vehicle and its surroundings.
 
     By default, the vehicle neither moves nor sees; subclasses override the methods.
-
-    Attributes:
-        resting_v: Voltage of the battery without load.
     """
-
-    resting_v: float
 
     def lay_out(self, seed: int) -> None:
         """Change the surroundings, and put the vehicle at a start in them."""
@@ -105,7 +100,7 @@ class World(Protocol):
 
     def inputs(self) -> Readings:
         """Quantities that sensors measure."""
-        return Readings(Pose(0.0, 0.0, 0.0), battery_v=self.resting_v)
+        return Readings(Pose(0.0, 0.0, 0.0), battery_v=RESTING_V)
 
     def distance_m(self) -> float:
         """Distance from the vehicle's nose to the nearest object ahead, m."""

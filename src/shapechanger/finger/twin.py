@@ -8,7 +8,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from shapechanger.contract.world import RESTING_V, World
+from shapechanger.contract.world import World
 from shapechanger.errors import RobotError
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.gap import resolve_gap
@@ -96,7 +96,6 @@ class FingerWorld(World):
         self._joint_noise = parameters.joint_noise
         self._order = np.arange(len(TENDONS))
         self._rig: Rig | None = None
-        self.resting_v = RESTING_V
         self.place(seed)
 
     def connect(self, tendons: Sequence[str], rig: Rig) -> None:

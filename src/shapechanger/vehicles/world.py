@@ -76,7 +76,6 @@ class MujocoWorld:
         model: Compiled MuJoCo model.
         data: State of the simulation.
         placed: How often the vehicle was put somewhere, at a start or back on its path.
-        resting_v: Voltage of the battery without load.
         travelled_m: Distance that the wheels rolled, m; backward counts down.
 
     Raises:
@@ -114,7 +113,6 @@ class MujocoWorld:
 
             self._camera = None if size is None else OnboardCamera(size, _CAMERA)
             self._distortions = [find_corruption(name) for name in lenses]
-        self.resting_v = RESTING_V
         self.travelled_m = 0.0
         self.placed = 0
         self.lay_out(seed)
@@ -225,7 +223,7 @@ class MujocoWorld:
             passed_s = steps * self._step_s
             self._rest_s -= passed_s
             bound, before = self._bound, self._motion
-            bound.drive(outputs, self.resting_v - _INNER_OHM * self._current_a)
+            bound.drive(outputs, RESTING_V - _INNER_OHM * self._current_a)
             mujoco.mj_step(self.model, self.data, nstep=steps)
             self._motion = now = bound.motion()
             self._contacts.follow(self.data, now, passed_s)
@@ -251,7 +249,7 @@ class MujocoWorld:
             acceleration_y=self._acceleration[1],
             yaw_rate=yaw_rate,
             bumped=self._contacts.bumped,
-            battery_v=self.resting_v - _INNER_OHM * self._current_a,
+            battery_v=RESTING_V - _INNER_OHM * self._current_a,
             current_a=self._current_a,
         )
 

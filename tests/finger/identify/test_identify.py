@@ -95,7 +95,7 @@ def kinematics(compliance: float, compliance_sd: float, noise: float = 1e-6) -> 
     """Return kinematics with nominal arms and a standard error of 0.1 mm."""
     return Kinematics(
         arms=NOMINAL.arms,
-        arms_covariance=1e-8 * np.eye(int(ARMS.sum())),
+        arms_sd=1e-4 * ARMS,
         compliance=compliance,
         compliance_sd=compliance_sd,
         joint_noise=np.full(4, noise),

@@ -42,10 +42,9 @@ def short() -> tuple[FingerLog, FingerParameters]:
 def exact(arms: np.ndarray = NOMINAL.arms) -> Kinematics:
     """Return kinematics without noise, with the given arms."""
     log, _ = short()
-    count = int(ARMS.sum())
     return Kinematics(
         arms=arms,
-        arms_covariance=ARM_SD_M**2 * np.eye(count),
+        arms_sd=ARM_SD_M * ARMS,
         compliance=0.0,
         compliance_sd=1e-9,
         joint_noise=np.full(4, 1e-6),

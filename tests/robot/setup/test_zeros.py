@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.as5600 import SimulatedJoints
 from shapechanger.robot.setup.calibration import find_joint_zeros, find_zeros
 from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.room import DrivingWorld
@@ -55,7 +56,7 @@ def test_zeros_are_the_counts_of_straight_joints(tremble: float) -> None:
 def test_a_missing_magnet_or_a_loose_tendon_is_an_error() -> None:
     """The error names it, and all servos are released; a car has neither."""
     board = _board()
-    board.pins.encoder("DIP_flexion").set_magnet("gone")
+    board.pins.of_kind(SimulatedJoints)[0].set_magnet("DIP_flexion", "gone")
     with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):
         find_joint_zeros(_RIG, board.hardware, lambda: None)
     rig = board.pins.require_rig()

@@ -10,6 +10,7 @@ from shapechanger.errors import RobotError
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld
 from shapechanger.layout import Layout
+from shapechanger.robot.drivers.as5600 import SimulatedJoints
 from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.guard.outputs import Switches, make_safe
 from shapechanger.robot.link.messages import Observation
@@ -193,8 +194,8 @@ def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
 def test_a_missing_magnet_releases_all_tendons(tensed: _Bench) -> None:
     """Tendons go to the pretension, then to zero, and stay released until a person arms."""
     tensed.drive(_BENT, 25)
-    magnet = tensed.robot.pins.encoder("PIP_flexion")
-    magnet.set_magnet("gone")
+    (joints,) = tensed.robot.pins.of_kind(SimulatedJoints)
+    joints.set_magnet("PIP_flexion", "gone")
     tensed.drive(_BENT, 2)
     assert tensed.seen.stop_reason == ""  # A short loss only marks the joint absent.
     assert tensed.seen.sources["PIP_flexion/angle"] == "absent"
@@ -203,7 +204,7 @@ def test_a_missing_magnet_releases_all_tendons(tensed: _Bench) -> None:
     assert not tensed.seen.armed
     tensed.drive(_BENT, 36)
     assert tensed.pulls() == [0.0] * 7
-    magnet.set_magnet("")
+    joints.set_magnet("PIP_flexion", "")
     tensed.drive(_BENT, 5)
     assert "no magnet" in tensed.seen.stop_reason
     tensed.robot.arm()

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import mujoco
 
-from shapechanger.vehicles.bodies import BoundVehicle, VehicleModel, add_vehicle
+from shapechanger.vehicles.bodies import VehicleModel, add_vehicle
+from shapechanger.vehicles.bodies.model import BoundVehicle
 from shapechanger.vehicles.bodies.parts import BATTERY_V
 
 LAND = ("car", "tank", "truck")

@@ -8,8 +8,8 @@ import mujoco
 import pytest
 
 from shapechanger.errors import ProfileError, UnknownName
-from shapechanger.vehicles.bodies import Motion, add_vehicle, require_fit, vehicle_model
-from shapechanger.vehicles.bodies.model import APART_S, BUMPER_SPREAD, ContactTracker
+from shapechanger.vehicles.bodies import add_vehicle, require_fit, vehicle_model
+from shapechanger.vehicles.bodies.model import APART_S, BUMPER_SPREAD, ContactTracker, Motion
 from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR
 from tests.vehicles.bodies.grounds import TO_THE_LEFT, Ground, ground
 

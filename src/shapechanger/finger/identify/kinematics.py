@@ -55,7 +55,7 @@ class Kinematics:
 
     Attributes:
         arms: Moment arms, m, (7, 4).
-        arms_covariance: Covariance of the 25 arms that are not zero, row by row, m², (25, 25).
+        arms_sd: Standard errors of the arms, m, (7, 4); 0 where a tendon passes no joint.
         compliance: Stretch per newton, m/N; near 0 for stiff tendons.
         compliance_sd: Standard error of `compliance`, m/N.
         joint_noise: Standard deviation of measured angles, rad, (4,).
@@ -63,18 +63,11 @@ class Kinematics:
     """
 
     arms: NDArray[np.float64]
-    arms_covariance: NDArray[np.float64]
+    arms_sd: NDArray[np.float64]
     compliance: float
     compliance_sd: float
     joint_noise: NDArray[np.float64]
     angles: NDArray[np.float64]
-
-    @property
-    def arms_sd(self) -> NDArray[np.float64]:
-        """Standard errors of the arms, m, (7, 4); 0 where a tendon passes no joint."""
-        sd = np.zeros(ARMS.shape)
-        sd[ARMS] = np.sqrt(np.diag(self.arms_covariance))
-        return sd
 
 
 def fit_kinematics(log: FingerLog) -> Kinematics:
@@ -104,7 +97,7 @@ def fit_kinematics(log: FingerLog) -> Kinematics:
     everywhere = data.variance(x, noise, length_noise)
     return Kinematics(
         arms=_arms(x),
-        arms_covariance=spread[:_N_ARMS, :_N_ARMS],
+        arms_sd=_placed(np.sqrt(np.diag(spread)[:_N_ARMS])),
         compliance=float(x[-3] * _UNITS[-3]),
         compliance_sd=float(np.sqrt(spread[-3, -3])),
         joint_noise=noise,
@@ -242,9 +235,14 @@ def _lags(control_dt: float) -> int:
 
 
 def _arms(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    arms = np.zeros(ARMS.shape)
-    arms[ARMS] = x[:_N_ARMS] * 1e-3
-    return arms
+    return _placed(x[:_N_ARMS] * 1e-3)
+
+
+def _placed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a value of each arm at its place, (7, 4)."""
+    placed = np.zeros(ARMS.shape)
+    placed[ARMS] = values
+    return placed
 
 
 def _total(

@@ -11,7 +11,6 @@ import errno
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from msgspec import Meta
@@ -176,43 +175,13 @@ _STATUS_OF: Final = {
 }
 
 
-class SimulatedAs5600(SimulatedChip):
-    """AS5600: magnetic encoder of a joint, with a function that returns the angle, rad."""
-
-    def __init__(self, keys: JointKeys, angle: Callable[[], float]) -> None:
-        self._keys = keys
-        self._angle = angle
-        self._magnet = ""
-
-    def set_magnet(self, state: Magnet | str) -> None:
-        """Set the state of the magnet."""
-        if state not in _STATUS_OF:
-            raise UnknownName("fault of a magnet", state, _STATUS_OF)
-        self._magnet = state
-
-    def read(self, register: int, length: int) -> list[int]:
-        """Read bytes, starting at a register; unused registers are 0."""
-        counts = 0
-        if self._magnet != "gone":
-            turned = self._keys.direction * self._angle() / (2.0 * math.pi)
-            counts = (self._keys.zero + round(turned * COUNTS_PER_TURN)) % COUNTS_PER_TURN
-        known = dict(enumerate((_STATUS_OF[self._magnet], *divmod(counts, 256)), _STATUS))
-        return [known.get(register + i, 0) for i in range(length)]
-
-
 class Tca9548a(SimulatedChip):
-    """TCA9548A: multiplexer of one I2C bus to eight; all are closed at power-on.
-
-    Attributes:
-        channels: Chip behind each channel, 0 to 7; all chips have the same address.
-        control: Its register, with a bit for each channel.
-    """
+    """TCA9548A: multiplexer of one I2C bus to eight; all channels are closed at power-on."""
 
     is_logged = False  # It has no outputs, and hundreds of writes a second would fill the ledger.
 
-    def __init__(self, channels: Mapping[int, SimulatedChip]) -> None:
-        self.channels = channels
-        self.control = 0
+    def __init__(self) -> None:
+        self.control = 0  # Its register, with a bit for each channel.
 
     def read(self, register: int, length: int) -> list[int]:
         """Read the control register; sending the register byte writes it first."""
@@ -224,21 +193,35 @@ class Tca9548a(SimulatedChip):
         self.control = (register, *data)[-1]
 
 
-class ChannelsBehind(SimulatedChip):
-    """The chips behind a multiplexer, at their common address; they have no settings."""
+class SimulatedAs5600s(SimulatedChip):
+    """The AS5600 behind a multiplexer, at their common address; they have no settings.
 
-    def __init__(self, mux: Tca9548a) -> None:
-        self._mux = mux
+    `measured` returns one reading of a joint's angle, rad, and raises RobotError for an unknown
+    joint.
+    """
+
+    def __init__(
+        self, mux: Tca9548a, joints: Mapping[str, JointKeys], measured: Callable[[str], float]
+    ) -> None:
+        self._mux, self._joints, self._measured = mux, joints, measured
+        self.magnets: dict[str, Magnet] = dict.fromkeys(joints, "")  # State of each magnet.
+        for name in joints:
+            measured(name)
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read all chips behind open channels: a bit that one of them pulls low is low."""
-        mux = self._mux
-        chips = [chip for channel, chip in mux.channels.items() if mux.control >> channel & 1]
-        if not chips:
+        """Read all encoders behind open channels: a bit that one of them pulls low is low."""
+        names = [name for name, one in self._joints.items() if self._mux.control >> one.channel & 1]
+        if not names:
             raise OSError(errno.EREMOTEIO, "no chip answers")  # Same error as from the kernel.
         data = [0xFF] * length
-        for chip in chips:
-            data = [a & b for a, b in zip(data, chip.read(register, length), strict=True)]
+        for name in names:
+            status, counts = _STATUS_OF[self.magnets[name]], 0
+            if self.magnets[name] != "gone":
+                keys = self._joints[name]
+                turned = keys.direction * self._measured(name) / (2.0 * math.pi)
+                counts = (keys.zero + round(turned * COUNTS_PER_TURN)) % COUNTS_PER_TURN
+            known = dict(enumerate((status, *divmod(counts, 256)), _STATUS))  # Others are 0.
+            data = [old & known.get(register + i, 0) for i, old in enumerate(data)]
         return data
 
 
@@ -247,20 +230,20 @@ class SimulatedJoints(SimulatedSensor):
 
     `measured_angle` of the world returns one reading of a joint's angle, rad, with the noise of its
     encoder, and raises RobotError for an unknown joint. Without it, all angles are zero.
-
-    Attributes:
-        encoders: Encoders, keyed by joint.
     """
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
-        keys = As5600Keys.of(plan.settings)
+        keys, mux = As5600Keys.of(plan.settings), Tca9548a()
         measured: Callable[[str], float] = getattr(world, "measured_angle", lambda _: 0.0)
-        self.encoders: dict[str, SimulatedAs5600] = {}
-        for name, joint in keys.rows.items():
-            measured(name)  # Raises for an unknown joint.
-            self.encoders[name] = SimulatedAs5600(joint, partial(measured, name))
-        mux = Tca9548a({keys.rows[name].channel: chip for name, chip in self.encoders.items()})
-        super().__init__({(keys.bus, keys.mux): mux, (keys.bus, ADDRESS): ChannelsBehind(mux)})
+        encoders = SimulatedAs5600s(mux, keys.rows, measured)
+        super().__init__({(keys.bus, keys.mux): mux, (keys.bus, ADDRESS): encoders})
+        self.magnets = encoders.magnets
+
+    def set_magnet(self, joint: str, state: Magnet) -> None:
+        """Set the state of the magnet of a joint."""
+        if state not in _STATUS_OF:
+            raise UnknownName("fault of a magnet", state, _STATUS_OF)
+        self.magnets[joint] = state
 
 
 def _features(plan: SensorPlan) -> list[Feature]:

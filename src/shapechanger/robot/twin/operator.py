@@ -7,8 +7,8 @@ import inspect
 from collections.abc import Callable
 from typing import Concatenate, NamedTuple, ParamSpec, Self, TypeVar, get_type_hints
 
-from shapechanger.errors import RobotError, WorldError, translate_errors
-from shapechanger.robot.drivers.as5600 import Magnet
+from shapechanger.errors import RobotError, UnknownName, WorldError, translate_errors
+from shapechanger.robot.drivers.as5600 import Magnet, SimulatedJoints
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.servos.simulation import ServoFault
 from shapechanger.robot.drivers.simulation import Levels
@@ -168,7 +168,10 @@ class Operator:
     @_at_board
     def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
         """Change the magnet of a joint's encoder; "" repairs it."""
-        self._board.encoder(joint).set_magnet(state)
+        joints = {name: one for one in self._board.of_kind(SimulatedJoints) for name in one.magnets}
+        if joint not in joints:
+            raise UnknownName("joint with an encoder", joint, joints)
+        joints[joint].set_magnet(joint, state)
         self._board.record("fault", detail=f"magnet {joint} {state or 'well'}")
 
     @_at_board

@@ -15,8 +15,7 @@ from io import RawIOBase
 from typing import Any, Final, Literal, TypeVar
 
 from shapechanger.contract.world import World
-from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.as5600 import SimulatedAs5600, SimulatedJoints
+from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.drivers.servos.settings import DRIVER, bus_settings
 from shapechanger.robot.drivers.servos.simulation import Rig
@@ -144,14 +143,6 @@ class PinBoard:
         if device not in (None, self._rig.device):
             raise RobotError(f"There is no {device} at this twin, only {self._rig.device}.")
         return self._rig
-
-    def encoder(self, joint: str) -> SimulatedAs5600:
-        """Return the encoder of a joint."""
-        joints = self.of_kind(SimulatedJoints)
-        encoders = {name: one for some in joints for name, one in some.encoders.items()}
-        if joint not in encoders:
-            raise UnknownName("joint with an encoder", joint, encoders)
-        return encoders[joint]
 
     def reader(self, pin: int) -> BoardConnection | None:
         """Return the owner of an input; None for other pins."""

@@ -98,7 +98,6 @@ class DrivingWorld(World):
         self._drive = kinds[0] if kinds else _Drive({})  # Other parts do not move.
         self._first_stripe = random.Random(f"room {seed}").uniform(0.0, 2.0 * _STRIPE)
         self._aim(size, math.radians(pitch_deg or 0.0), fovy_deg)
-        self.resting_v = RESTING_V
         self._travelled = 0.0
         self.place(seed)
 
@@ -139,7 +138,7 @@ class DrivingWorld(World):
             acceleration_y=self._speed * self._yaw_rate,
             yaw_rate=self._yaw_rate,
             bumped=bool(self._cast(_BUMPER)[0].min() <= RADIUS + _CONTACT),
-            battery_v=self.resting_v - _SAG_V * self._load,
+            battery_v=RESTING_V - _SAG_V * self._load,
         )
 
     def distance_m(self) -> float:

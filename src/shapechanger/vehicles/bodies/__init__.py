@@ -15,7 +15,7 @@ import mujoco
 
 from shapechanger.errors import ProfileError, UnknownName
 from shapechanger.vehicles.bodies.boat import Floating
-from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs, Rolling
+from shapechanger.vehicles.bodies.model import BoundVehicle, Rolling
 from shapechanger.vehicles.bodies.parts import (
     HOBBY_MOTOR,
     CameraMount,
@@ -24,18 +24,6 @@ from shapechanger.vehicles.bodies.parts import (
     aim_camera,
 )
 from shapechanger.vehicles.bodies.visuals import dress
-
-__all__ = [
-    "SIM_DT",
-    "VEHICLES",
-    "BoundVehicle",
-    "Motion",
-    "Outputs",
-    "VehicleModel",
-    "add_vehicle",
-    "require_fit",
-    "vehicle_model",
-]
 
 SIM_DT: Final = 0.005
 """Simulation step, s, at which all vehicles are stable."""

@@ -158,12 +158,6 @@ class Course:
         """Distance between two points of the route, m."""
         return float(np.hypot(*(self.route[1] - self.route[0])))
 
-    @property
-    def length(self) -> float:
-        """Length of the route, m."""
-        steps = np.diff(self.route, axis=0, append=self.route[:1])
-        return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
-
 
 def require_element(vehicle: str, *, floats: bool, world: str) -> None:
     """Check that a world has water if, and only if, the vehicle floats."""
