@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from shapechanger.contract.limits import slewed as slewed_by_guard
 from shapechanger.contract.plan import ActionPlan
 from shapechanger.errors import FingerError, UnknownName
-from shapechanger.finger.anatomy import JOINT_REST
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
 from shapechanger.finger.plant import FingerPlant, JointVelocities, slewed, slews
 from shapechanger.finger.tensions import drive_of
@@ -74,18 +73,6 @@ def test_an_impedance_is_held_between_computations() -> None:
     assert np.abs(prompt[ends] - prompt[ends - 9]).max() > 0.1
 
 
-def test_a_slew_on_one_side_rectifies_chatter() -> None:
-    """A fall without a limit lowers the mean tension; equal limits keep it."""
-    chatter = [0.4, -0.4] * 20
-    free, rectified, even = (
-        _tensions(_RIG.replace(path=CommandPath(slew_per_s=up, slew_down_per_s=down)), chatter)
-        for up, down in ((None, None), (20.0, None), (20.0, 20.0))
-    )
-    span = _MOST[0] - NOMINAL.least_tension
-    assert free[200:].mean() - rectified[200:].mean() > 0.03 * span
-    assert abs(free[200:].mean() - even[200:].mean()) < 0.01 * span
-
-
 _slews = st.none() | st.sampled_from([2.0, 20.0])
 _shares = st.floats(0.0, 1.0)
 
@@ -136,26 +123,3 @@ def test_velocities_have_a_lag_of_40_ms() -> None:
     np.testing.assert_allclose(found, [[1.0 - x, -2.0 * (1.0 - x)] for x in left], atol=1e-12)
     velocities.forget()
     np.testing.assert_array_equal(velocities.of(np.array([9.0, 9.0])), np.zeros(2))
-
-
-def test_noisy_joints_have_filtered_velocities() -> None:
-    """Simulated fingers with joint noise use the filter of rigs."""
-    noisy = NOMINAL.replace(joint_noise=0.01)
-    plant = FingerPlant(noisy, drive_of("tension", noisy))
-    velocities, rng = JointVelocities(), np.random.default_rng(0)
-    senses = plant.place(JOINT_REST, rng)
-    for _ in range(5):
-        np.testing.assert_array_equal(senses.velocities, velocities.of(senses.angles))
-        senses = plant.act(np.full(7, -0.5), rng)
-
-
-def test_tensions_are_at_least_the_pretension() -> None:
-    """The pretension holds from the first moment on."""
-    parameters = NOMINAL.replace(least_tension=1.5)
-    plant = FingerPlant(parameters, drive_of("tension", NOMINAL))
-    rng = np.random.default_rng(0)
-    senses = plant.place(JOINT_REST, rng)
-    assert senses.tensions.min() == pytest.approx(1.5)
-    for _ in range(10):
-        senses = plant.act(np.full(7, -1.0), rng)
-    assert senses.tensions.min() == pytest.approx(1.5)

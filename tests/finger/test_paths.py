@@ -192,15 +192,6 @@ def test_a_phase_is_a_shift_in_time(make: Callable[..., FingertipPath], phase: f
     )
 
 
-def test_a_line_rests_at_both_ends() -> None:
-    """A line goes there and back in one period, fastest in the middle."""
-    path: Any = line((0.06, 0.0, -0.04), (0.04, 0.0, -0.04), hz=0.25)
-    times = np.array([0.0, 1.0, 2.0, 4.0])
-    np.testing.assert_allclose(path.at(times)[:, 0], [0.06, 0.05, 0.04, 0.06], rtol=1e-12)
-    speeds = np.linalg.norm(path.position(times, 1), axis=1)
-    np.testing.assert_allclose(speeds, [0.0, 0.01 * math.pi / 2, 0.0, 0.0], atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [

@@ -89,26 +89,3 @@ def test_the_legend_shows_tensions() -> None:
     assert (frame == 230).all()
     small = frame[:120, :160]
     assert tendon_legend(small, np.ones(7)) is small
-
-
-def test_a_frame_of_a_path_shows_path_and_trail() -> None:
-    """The path is a green line, and the fingertip leaves a purple one; depth has neither."""
-    size = {"width": 480, "height": 360}
-    with gym.make("shapechanger/FingerTrack-v1", render_mode="rgb_array", **size) as env:
-        env.reset(seed=0)
-        env.render()
-        before = _purple(env.render())
-        for _ in range(20):
-            env.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
-        assert _purple(env.render()) > before + 50
-        env.unwrapped._trail.clear()
-        with_path = env.render()
-        env.unwrapped._markers = list
-        assert _differs(env.render(), with_path).sum() > 300
-        env.reset(seed=0)
-        assert len(env.unwrapped._trail) == 1
-
-
-def _purple(frame: np.ndarray) -> int:
-    red, green, blue = np.moveaxis(frame.astype(int), 2, 0)
-    return int(((blue > green + 30) & (red > green + 5)).sum())

@@ -11,7 +11,6 @@ from shapechanger.finger.anatomy import (
     JOINT_RANGE,
     LEAST_TENSION_N,
     MOMENT_ARMS,
-    MOST_TENSION_N,
     PHALANX_LENGTH_M,
 )
 from shapechanger.finger.postures import (
@@ -23,10 +22,8 @@ from shapechanger.finger.postures import (
     moving_torque,
 )
 from shapechanger.finger.task import fingertip
-from shapechanger.finger.tensions import tensions_for_torque
 from tests.finger.commands import can_hold, made
 
-_STILL = np.zeros(4)
 _LOW, _HIGH = JOINT_RANGE.T
 
 
@@ -50,24 +47,6 @@ def test_every_posture_of_the_range_can_be_held() -> None:
         free = low[:3] + share[:3] * (high - low)[:3]
         off = DIP_BAND * (2.0 * share[3] - 1.0)
         assert can_hold(np.array(coupled(free[0], free[1], free[2], off)).clip(low, high))
-
-
-def test_balanced_tensions_hold_a_posture() -> None:
-    """In the simulator, each joint stays for a second under the computed tensions."""
-    model = made()
-    rng = np.random.default_rng(0)
-    most = np.array(MOST_TENSION_N)
-    for _ in range(10):
-        posture = draw_posture(rng)
-        torque = moving_torque(posture, _STILL, _STILL)
-        tensions, is_enough = tensions_for_torque(MOMENT_ARMS, torque, LEAST_TENSION_N, most)
-        assert is_enough
-        data = mujoco.MjData(model)
-        data.qpos[:] = posture
-        middle, half = 0.5 * (most + LEAST_TENSION_N), 0.5 * (most - LEAST_TENSION_N)
-        data.ctrl[:] = data.act[:] = (tensions - middle) / half
-        mujoco.mj_step(model, data, 500)
-        np.testing.assert_allclose(data.qpos, posture, atol=np.radians(0.5))
 
 
 def test_moving_torque_gives_the_acceleration() -> None:

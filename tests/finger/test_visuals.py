@@ -1,7 +1,5 @@
 """Visual anatomy of the finger, and the finger as an MJCF file."""
 
-import itertools
-
 import mujoco
 import numpy as np
 import pytest
@@ -11,7 +9,7 @@ from shapechanger.finger.gap import GAPS
 from shapechanger.finger.model import TARGET, FingerFigure, build_finger, finger_mjcf
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.tensions import DRIVES, drive_of
-from shapechanger.finger.visuals import TENDON_COLOURS, THICKEST_M, THINNEST_M, route_names
+from shapechanger.finger.visuals import THICKEST_M, THINNEST_M, route_names
 from tests.finger.commands import STRETCHED, at_rest, made
 
 
@@ -70,15 +68,6 @@ def test_routes_agree_with_the_moment_arms() -> None:
     large[:2, 1] = False
     assert large.sum() == 12
     np.testing.assert_array_equal(np.sign(shown[large]), np.sign(NOMINAL.arms[large]))
-
-
-def test_tendon_colours_are_distinct() -> None:
-    """The colours differ for the colour-blind too."""
-    assert tuple(TENDON_COLOURS) == TENDONS
-    # Deuteranopia: red and green merge, with the weights of Viénot et al. 1999.
-    seen = [(0.29 * r + 0.71 * g, b) for r, g, b in TENDON_COLOURS.values()]
-    for one, other in itertools.combinations(seen, 2):
-        assert np.linalg.norm(np.subtract(one, other)) > 0.1
 
 
 def test_show_sets_the_figure() -> None:

@@ -14,7 +14,7 @@ from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles import world as world_module
 from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
 from shapechanger.vehicles.bodies.parts import CameraJitter
-from shapechanger.vehicles.courses.course import HOME, Look
+from shapechanger.vehicles.courses.course import Look
 from shapechanger.vehicles.world import MujocoWorld
 
 _AHEAD: Mapping[str, Mapping[str, float]] = {
@@ -85,21 +85,6 @@ def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
     return Pose(float(x), float(y), math.atan2(-along[0], along[1]))
 
 
-@_EACH
-def test_a_vehicle_starts_in_its_default_world_at_rest_and_drives(vehicle: str) -> None:
-    world = _world(vehicle)
-    seen = world.inputs()
-    assert world.course.world == HOME[vehicle]
-    assert world.seed == 3
-    assert seen.speed == pytest.approx(0.0, abs=1e-6)
-    assert not world.touches
-    assert world.truth() == {"progress_m": 0.0, "collisions": 0.0}
-    _drive(world, _AHEAD[vehicle], 2.0)
-    assert world.truth()["progress_m"] > 0.3
-    assert world.inputs().speed > 0.2
-    assert world.inputs().travelled_m > 0.2
-
-
 def test_the_time_step_of_calls_does_not_matter() -> None:
     """The remainder of a step is carried over to the next call."""
     worlds = []
@@ -111,19 +96,6 @@ def test_the_time_step_of_calls_does_not_matter() -> None:
     assert cut.pose == steps.pose
     assert math.dist((whole.pose.x, whole.pose.y), (steps.pose.x, steps.pose.y)) < 0.01
     assert cut.data.time == pytest.approx(100 * SIM_DT)
-
-
-def test_place_restarts_at_a_seeded_pose_and_repeats_its_drive() -> None:
-    world = _world()
-    starts, ends = [], []
-    for seed in (5, 6, 5):
-        world.place(seed)
-        assert (world.progress_m, world.inputs().speed) == (0.0, 0.0)
-        starts.append(world.pose)
-        _drive(world, _AHEAD["car"], 1.0)
-        ends.append(world.pose)
-    assert starts[0] == starts[2] != starts[1]
-    assert ends[0] == ends[2]
 
 
 def test_running_into_a_wall_is_one_collision_and_put_back_frees_the_vehicle() -> None:

@@ -22,7 +22,7 @@ from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.room import DrivingWorld
 from tests.robot.twin.in_process import LocalBoard
-from tests.robot.twin.robots import ACTIONS, BUMPER, CAR, DRIVE, ENCODER, STEER, esc, hbridge, servo
+from tests.robot.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc, hbridge, servo
 
 _DISTANCE = SensorPlan("sonar", "hcsr04", "distance", {"trigger": 20, "echo": 21, "max_m": 3.0})
 
@@ -56,15 +56,6 @@ def _rig(sensor: SensorPlan) -> Iterator[_Rig]:
     rig.board.hardware.close()
 
 
-@pytest.mark.parametrize("throttle", [0.5, -0.5])
-def test_the_encoder_measures_the_speed(throttle: float) -> None:
-    with _rig(ENCODER) as rig:
-        rig.motor.value = throttle
-        seen = rig.advance(0.6)
-        assert seen["speed"] == pytest.approx(rig.operator.where().speed, rel=0.1)
-        assert seen["speed"] * throttle > 0.0
-
-
 def test_joint_encoders_measure_the_angles() -> None:
     keys = [(7, 4090, 1), (0, 5, -1), (3, 2048, -1), (4, 1000, 1)]
     rows = {
@@ -79,19 +70,6 @@ def test_joint_encoders_measure_the_angles() -> None:
         world.place(seed)
         truth = {name: v for name, v in world.truth().items() if name.endswith("/angle")}
         assert driver.read(0, 0.0) == pytest.approx(truth, abs=0.51 * 2.0 * math.pi / 4096)
-
-
-def test_the_bumper_is_pressed() -> None:
-    with _rig(BUMPER) as rig:
-        assert rig.advance(0.02)["bump"] == 0.0
-        rig.operator.press_bumper()
-        assert rig.advance(0.02)["bump"] == 1.0
-        rig.operator.press_bumper(False)
-        assert rig.advance(0.03)["bump"] == 0.0
-        rig.motor.value = 1.0
-        while not rig.operator.where().bumped:
-            rig.advance(0.05)
-        assert rig.advance(0.02)["bump"] == 1.0
 
 
 def test_the_distance_is_measured() -> None:

@@ -43,14 +43,6 @@ def test_the_motor_matches_its_data_sheet() -> None:
     assert HOBBY_MOTOR.torque_per_current * 6.0 == pytest.approx(1.2 * 0.0980665)
 
 
-def test_a_gear_trades_speed_for_torque() -> None:
-    geared = HOBBY_MOTOR.geared(3.0)
-    assert geared.amperes(6.0, 10.0) == pytest.approx(HOBBY_MOTOR.amperes(6.0, 30.0))
-    assert geared.torque_per_current == pytest.approx(3.0 * HOBBY_MOTOR.torque_per_current)
-    assert geared.rotor_inertia == pytest.approx(9.0 * HOBBY_MOTOR.rotor_inertia)
-    assert HOBBY_MOTOR.geared(3.0, 0.5).friction == pytest.approx(1.5 * HOBBY_MOTOR.friction)
-
-
 @pytest.mark.parametrize("name", ["car", "truck"])
 @pytest.mark.parametrize("throttle", [0.25, 0.6])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -184,17 +176,6 @@ def test_a_wall_is_one_collision_also_when_it_is_left_for_a_moment() -> None:
         assert not bench.touch.touches
         bench.stand(0.91)
         assert bench.touch.collisions == collisions
-
-
-def test_release_begins_another_collision_and_reset_clears_all() -> None:
-    bench = _Bench()
-    bench.stand(0.91)
-    bench.touch.release()
-    assert not bench.touch.touches
-    bench.stand(0.91)
-    assert bench.touch.collisions == 2
-    bench.touch.reset()
-    assert (bench.touch.collisions, bench.touch.bumped) == (0, False)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from shapechanger.vehicles.courses.geometry import (
     any_crossing,
     distances_from_obstacle,
     distances_to_segments,
-    obstacle_gap,
     trace_outline,
     wall_segments,
 )
@@ -193,45 +192,6 @@ def test_a_full_lane_starts_at_its_first_point() -> None:
 )
 def test_self_touching_outlines_are_refused(cells: frozenset[tuple[int, int]]) -> None:
     assert trace_outline(cells) is None
-
-
-def _random_obstacle(rng: np.random.Generator) -> Obstacle:
-    x, y, yaw = rng.uniform(-2.0, 2.0, 3)
-    long, wide = rng.uniform(0.2, 1.5, 2)
-    if rng.random() < 0.4:
-        return Obstacle("bin", x, y, 0.0, long, long, 1.0)
-    return Obstacle("box", x, y, yaw, long, wide, 1.0)
-
-
-def _samples(obstacle: Obstacle) -> np.ndarray:
-    a = np.linspace(-0.5, 0.5, 41)
-    shares = np.stack(np.meshgrid(a, a), axis=-1).reshape(-1, 2)
-    if obstacle.is_round:
-        angles = np.linspace(0, 6.3, 150)
-        shares = np.concatenate([np.outer(a, [np.cos(t), np.sin(t)]) for t in angles])
-    cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
-    along = shares * [obstacle.length, obstacle.width]
-    return along @ np.array([[cos, sin], [-sin, cos]]) + [obstacle.x, obstacle.y]
-
-
-def _nearest(one: np.ndarray, other: np.ndarray) -> float:
-    some = one[:: max(1, len(one) // 300)]
-    return float(min(np.hypot(*(other - point).T).min() for point in some))
-
-
-@pytest.mark.parametrize("seed", range(25))
-def test_distances_are_those_of_the_nearest_points(seed: int) -> None:
-    """Distances equal the nearest samples', and are 0 or less on overlap."""
-    rng = np.random.default_rng(seed)
-    one, other = _random_obstacle(rng), _random_obstacle(rng)
-    piece = rng.uniform(-2.0, 2.0, (1, 4))
-    line = piece[0, :2] + np.linspace(0, 1, 200)[:, None] * (piece[0, 2:] - piece[0, :2])
-    assert obstacle_gap(one, other) == pytest.approx(obstacle_gap(other, one))
-    for found, points in (
-        (obstacle_gap(one, other), _samples(other)),
-        (float(distances_from_obstacle(one, piece)[0]), line),
-    ):
-        assert max(found, 0.0) == pytest.approx(_nearest(_samples(one), points), abs=0.1)
 
 
 def test_segments_that_share_an_end_do_not_cross() -> None:
