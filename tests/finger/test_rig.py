@@ -145,7 +145,7 @@ def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
     ("arguments", "error", "sentence"),
     [
         ({"twin": "real-lik"}, UnknownName, "real-like"),
-        ({}, UnknownName, 'Without a rig, give twin="real-like"'),
+        ({}, UnknownName, "No known robot matches 'finger'"),
         ({"twin": "nominal", "finger_seed": 3}, FingerError, "selects a finger of a gap"),
         ({"finger_seed": 3}, FingerError, "selects a finger of a gap"),
     ],

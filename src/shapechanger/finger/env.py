@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any, Final, cast
+from typing import Any, Final, Self, cast
 
 import gymnasium as gym
 import msgspec
@@ -92,6 +92,12 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     _spec: EnvSpec | None = None
     _target: NDArray[np.float64]
 
+    def __new__(cls, *arguments: Any, **options: Any) -> Self:
+        """Keep the arguments, with which a copy is pickled."""
+        env = super().__new__(cls)
+        EzPickle.__init__(env, *arguments, **options)
+        return env
+
     def __init__(
         self,
         *,
@@ -104,8 +110,6 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         width: int = _PICTURE,
         height: int = _PICTURE,
     ) -> None:
-        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
-        EzPickle.__init__(self, **arguments)
         if render_mode not in (None, *_MODES):
             raise UnknownName("render mode", str(render_mode), _MODES)
         if render_mode is not None:

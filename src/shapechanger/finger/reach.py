@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import RETURN, SUCCESS
@@ -121,7 +120,6 @@ class FingerReachEnv(FingerEnv):
 
     def __init__(self, *, goal: bool = False, **arguments: Any) -> None:
         super().__init__(**arguments)
-        EzPickle.__init__(self, goal=goal, **arguments)
         self._has_goal = goal
         self._target = np.zeros(3)
         self._steps_near = 0

@@ -11,7 +11,6 @@ from typing import Any, ClassVar, Final, cast
 
 import mujoco
 import numpy as np
-from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, RobotRefused, UnknownName, check_seed
@@ -26,7 +25,6 @@ from shapechanger.finger.rig import RigSenses, StartApproach
 from shapechanger.finger.task import FingerSenses
 from shapechanger.finger.track import FingerTrackEnv
 from shapechanger.robot.client.env import RemoteVehicleEnv
-from shapechanger.robot.client.known_robots import KNOWN_ROBOT
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
 
@@ -109,16 +107,10 @@ class RigMixin(FingerEnv):
                 timeout_s=_TIMEOUT_S if self._own is None else _OWN_TIMEOUT_S,
                 **more,
             )
-            try:
-                rig = connect(pace="lockstep")
-                if rig.welcome.clock == "real":
-                    rig.close()
-                    rig = connect(pace="realtime")
-            except UnknownName as error:
-                if error.kind == KNOWN_ROBOT:
-                    hint = 'Without a rig, give twin="real-like": the env then serves one itself.'
-                    raise UnknownName(error.kind, error.name, error.known, hint) from None
-                raise
+            rig = connect(pace="lockstep")
+            if rig.welcome.clock == "real":
+                rig.close()
+                rig = connect(pace="realtime")
             self._rig = opened.enter_context(closing(rig))
             name = rig.welcome.robot
             self._rig_senses = RigSenses(name, rig.action_layout, rig.observation_layout)
@@ -318,7 +310,6 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
 
     def __init__(self, robot: str = "finger", *, goal: bool = False, **rig: Any) -> None:
         super().__init__(robot, {"goal": goal}, **rig)
-        EzPickle.__init__(self, robot, goal=goal, **rig)
 
 
 class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
@@ -360,7 +351,6 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
 
     def __init__(self, robot: str = "finger", *, path: PathSource = "circle", **rig: Any) -> None:
         super().__init__(robot, {"path": path}, **rig)
-        EzPickle.__init__(self, robot, path=path, **rig)
 
 
 def _serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:

@@ -8,7 +8,6 @@ from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.errors import PathError
@@ -190,7 +189,6 @@ class FingerTrackEnv(FingerEnv):
 
     def __init__(self, *, path: PathSource = "circle", **arguments: Any) -> None:
         super().__init__(**arguments)
-        EzPickle.__init__(self, path=path, **arguments)
         self.path_is_random = path == RANDOM
         self._path: FingertipPath = as_path("circle" if self.path_is_random else path)
         self._begin = require_reachable(self._path)

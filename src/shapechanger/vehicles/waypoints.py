@@ -56,16 +56,12 @@ class SteeringResponse:
     rate of turn to the right = steering * (per_metre * speed + per_second). Wheels turn a vehicle
     faster when it rolls faster; tracks turn it even at rest.
 
-    Attributes:
-        per_metre: Turn for each metre at full steering, rad/m.
-        per_second: Turn for each second at full steering, rad/s.
-
     Raises:
         StudyError: If the vehicle does not turn, or a number is negative.
     """
 
-    per_metre: float
-    per_second: float
+    per_metre: float  # Turn for each metre at full steering, rad/m.
+    per_second: float  # Turn for each second at full steering, rad/s.
 
     def __post_init__(self) -> None:
         if not (min(self.per_metre, self.per_second) >= 0.0 < self.per_metre + self.per_second):
@@ -306,18 +302,14 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
 
 
 class WaypointLabels(NamedTuple):
-    """Waypoints that a driver's commands lead to.
+    """Waypoints that a driver's commands lead to."""
 
-    Attributes:
-        actions: Bearing and speed, each from -1 to 1, shape (n, 2).
-        usable: Whether a command determines a waypoint, shape (n,). It does not if the vehicle
-            stands still, drives backward, or did not measure its speed.
-        at_limit: Whether the bearing is only a lower bound, shape (n,): at full steering, or
-            beyond the widest bearing.
-    """
-
-    actions: NDArray[np.float32]
+    actions: NDArray[np.float32]  # Bearing and speed, each from -1 to 1, shape (n, 2).
+    # Whether a command determines a waypoint, shape (n,). It does not if the vehicle stands still,
+    # drives backward, or did not measure its speed.
     usable: NDArray[np.bool_]
+    # Whether the bearing is only a lower bound, shape (n,): at full steering, or beyond the widest
+    # bearing.
     at_limit: NDArray[np.bool_]
 
 

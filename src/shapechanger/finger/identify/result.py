@@ -81,23 +81,14 @@ _UNITS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class ParameterEstimate:
-    """One parameter of a finger with its 95 % interval.
+    """One parameter of a finger with its 95 % interval."""
 
-    Attributes:
-        name: Name, such as `moment_arms/FDP/MCP_flexion`.
-        unit: SI unit.
-        value: Estimate.
-        low: Lower end of the interval.
-        high: Upper end of the interval.
-        nominal: Value of the nominal finger; infinite for the stiffness of its stiff tendons.
-    """
-
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-    nominal: float
+    name: str  # Name, such as `moment_arms/FDP/MCP_flexion`.
+    unit: str  # SI unit.
+    value: float  # Estimate.
+    low: float  # Lower end of the interval.
+    high: float  # Upper end of the interval.
+    nominal: float  # Value of the nominal finger; infinite for the stiffness of its stiff tendons.
 
     @property
     def differs(self) -> bool:
@@ -107,19 +98,13 @@ class ParameterEstimate:
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
-    """Measured and simulated motion in the part of a log that was not fitted.
+    """Measured and simulated motion in the part of a log that was not fitted."""
 
-    Attributes:
-        t: Time since the start of the log, s, (n,).
-        measured: Measured angles, rad, (n, 4).
-        identified: Angles of the identified finger under the same commands, rad, (n, 4).
-        nominal: Angles of the nominal finger, rad, (n, 4).
-    """
-
-    t: NDArray[np.float64]
-    measured: NDArray[np.float64]
+    t: NDArray[np.float64]  # Time since the start of the log, s, (n,).
+    measured: NDArray[np.float64]  # Measured angles, rad, (n, 4).
+    # Angles of the identified finger under the same commands, rad, (n, 4).
     identified: NDArray[np.float64]
-    nominal: NDArray[np.float64]
+    nominal: NDArray[np.float64]  # Angles of the nominal finger, rad, (n, 4).
 
     @property
     def off(self) -> tuple[float, float]:

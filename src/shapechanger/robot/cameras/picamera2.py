@@ -34,32 +34,30 @@ class PiCamera(Camera):
             from picamera2 import Picamera2  # pyright: ignore[reportMissingModuleSource]
         self._lock = threading.Lock()  # `close` waits for a `read` in progress.
         number = plan.settings["number"]
-        with translate_errors(
-            RuntimeError,
-            IndexError,
-            to=lambda error: RobotError(
-                f"There is no camera {number}: {error}. "
-                "`rpicam-hello --list-cameras` lists what the system sees."
+        period_us = round(1e6 / plan.fps)
+        with (
+            translate_errors(
+                RuntimeError,
+                IndexError,
+                to=lambda error: RobotError(
+                    f"Camera {number} does not start: {error}. "
+                    "`rpicam-hello --list-cameras` lists what the system sees."
+                ),
             ),
+            ExitStack() as undo,
         ):
             self._camera: Any = Picamera2(number)
-        period_us = round(1e6 / plan.fps)
-        with ExitStack() as undo:
             undo.callback(self._camera.close)
-            with translate_errors(
-                RuntimeError,
-                to=lambda error: RobotError(f"The Pi's camera does not start: {error}."),
-            ):
-                self._camera.configure(
-                    self._camera.create_video_configuration(
-                        main={"size": plan.size, "format": _FORMAT},
-                        transform=Transform(hflip=int(plan.flip), vflip=int(plan.flip)),
-                        # Flush: a frame from before the call would be old (picamera2#787).
-                        queue=False,
-                        controls={"FrameDurationLimits": (period_us, period_us)},
-                    )
+            self._camera.configure(
+                self._camera.create_video_configuration(
+                    main={"size": plan.size, "format": _FORMAT},
+                    transform=Transform(hflip=int(plan.flip), vflip=int(plan.flip)),
+                    # Flush: a frame from before the call would be old (picamera2#787).
+                    queue=False,
+                    controls={"FrameDurationLimits": (period_us, period_us)},
                 )
-                self._camera.start()
+            )
+            self._camera.start()
             undo.pop_all()
 
     def read(self) -> Frame:

@@ -28,9 +28,6 @@ from shapechanger.files import cannot_write, read_text, write_atomic
 from shapechanger.robot.link import authentication
 from shapechanger.robot.link.address import Address, parse_address
 
-KNOWN_ROBOT: Final = "known robot"
-"""Kind of the name of a robot, in errors."""
-
 INSECURE: Final = "insecure"
 """Value instead of a fingerprint for no encryption and no proof of the robot's identity."""
 
@@ -162,7 +159,7 @@ def _file(name: str) -> Path:
     names = known_names()
     if name not in names:
         serve = "`shapechanger robot serve PROFILE --twin` serves a twin and makes it known."
-        raise UnknownName(KNOWN_ROBOT, name, names, serve)
+        raise UnknownName("known robot", name, names, serve)
     return known_folder() / f"{name}.toml"
 
 

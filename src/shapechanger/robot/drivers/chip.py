@@ -67,19 +67,12 @@ class KeyMistake(ValueError):
 
 
 class Claim(NamedTuple):
-    """A resource that only one key of a profile may use.
+    """A resource that only one key of a profile may use."""
 
-    Attributes:
-        key: Name of the key that claims it.
-        resource: A pin, a channel or an address.
-        group: Users of one group may share it; "" for exclusive use.
-        use: What it is used for, as the end of a sentence; may be empty.
-    """
-
-    key: str
-    resource: str
-    group: str = ""
-    use: str = ""
+    key: str  # Name of the key that claims it.
+    resource: str  # A pin, a channel or an address.
+    group: str = ""  # Users of one group may share it; "" for exclusive use.
+    use: str = ""  # What it is used for, as the end of a sentence; may be empty.
 
 
 class Keys(msgspec.Struct, frozen=True):
