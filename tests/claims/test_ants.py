@@ -69,7 +69,7 @@ def _stretched(seed: int) -> Body:
 def _bodies(*bodies: tuple[str, Body]) -> Any:
     """Parametrize over each ant of the catalogue, and ants of these bodies."""
     cases = [pytest.param(env_id, {}, id=env_id) for env_id in _ANTS]
-    passive = {"actuated_extension": False}
+    passive = {"body": "ExtendedAntPassive"}
     cases.append(pytest.param("shapechanger/ExtendedAnt-v1", passive, id="passive feet"))
     cases += [
         pytest.param("shapechanger/Ant-v1", {"body": to_json(body)}, id=name)
@@ -299,7 +299,7 @@ def test_the_extended_ant_has_its_feet_last() -> None:
 
 def test_the_extended_ant_starts_at_1_25_m() -> None:
     """The start height equals the original release's (2017)."""
-    for arguments in ({}, {"actuated_extension": False}):
+    for arguments in ({}, {"body": "ExtendedAntPassive"}):
         with gym.make("shapechanger/ExtendedAnt-v1", **arguments) as env:
             assert env.unwrapped.init_qpos[2] == 1.25
 

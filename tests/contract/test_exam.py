@@ -26,7 +26,7 @@ from shapechanger.envs.own_tasks import RobotState
 
 # Bodies without an id, and arguments that change a space.
 _VARIANTS: dict[str, MakeEnv] = {
-    "passive feet": partial(gym.make, "shapechanger/ExtendedAnt-v1", actuated_extension=False),
+    "passive feet": partial(gym.make, "shapechanger/ExtendedAnt-v1", body="ExtendedAntPassive"),
     "place seen, contacts unseen": partial(
         gym.make,
         "shapechanger/Ant-v1",

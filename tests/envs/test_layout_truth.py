@@ -52,7 +52,7 @@ _CASES: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "ExtendedAnt without foot motors": (
         "shapechanger/ExtendedAnt-v1",
-        {"actuated_extension": False},
+        {"body": "ExtendedAntPassive"},
     ),
     "an ant of a file": ("shapechanger/OwnRobot-v1", {"path": ASSETS + "/ant.xml"}),
     "five legs, a stiff ankle and a shin": (

@@ -58,7 +58,6 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
         summary: One-line description.
         entry_point: Module and class.
         learner: Name of the learner settings tuned on the family or the env.
-        body: Name of its body, passed to the class; empty for the default of the class.
         reward_threshold: Return that counts as solved.
         episode_steps: Steps after which an episode is truncated.
         device: Module that registers its batched functions for a device; empty if it has none.
@@ -69,7 +68,6 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
     summary: str
     entry_point: str
     learner: str
-    body: str = ""
     reward_threshold: float | None = None
     episode_steps: int = 1000
     device: str = ""
@@ -103,7 +101,7 @@ _FAMILIES: Final = {
     "Hopper": ("runners:HopperEnv", "ppo-planar", 3800.0),
     "Walker2d": ("runners:Walker2dEnv", "ppo-planar", None),
     "Swimmer": ("runners:SwimmerEnv", "ppo-swim", 360.0),
-    "Humanoid": ("humanoid:HumanoidEnv", "ppo-humanoid", None),
+    "Humanoid": ("runners:HumanoidEnv", "ppo-humanoid", None),
     "InvertedDoublePendulum": ("pendulum:InvertedDoublePendulumEnv", "ppo-planar", 9100.0),
 }
 # Name, family and summary of each body.
@@ -127,11 +125,8 @@ _BODIES: Final = (
 def _entry(name: str, family: str, summary: str) -> CatalogueEntry:
     """Return the entry of a body."""
     entry_point, learner, threshold = _FAMILIES[family]
-    body = name
-    if name == "ExtendedAnt":  # Its class chooses between two bodies.
-        entry_point, body = "ant:ExtendedAntEnv", ""
     place = f"shapechanger.envs.{entry_point}"
-    return CatalogueEntry(name, family, summary, place, learner, body, threshold)
+    return CatalogueEntry(name, family, summary, place, learner, threshold)
 
 
 CATALOGUE: Final = {entry.id: entry for entry in (_entry(*row) for row in _BODIES)}
@@ -175,7 +170,7 @@ def register_all() -> None:
             # These envs check that `reset` was called, and the tests check the envs.
             order_enforce=entry.family not in _TUNED,
             disable_env_checker=entry.family in _TUNED,
-            kwargs={"body": entry.body} if entry.body else {},
+            kwargs={"body": entry.name},
         )
     vectors = "shapechanger.envs.make_vec:OwnRobot"
     _register(OWN_ROBOT, "shapechanger.envs.own:OwnRobotEnv", vector_entry_point=vectors)

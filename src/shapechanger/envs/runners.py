@@ -1,4 +1,4 @@
-"""Half cheetah, hopper, walker and swimmer: their families of bodies, and their envs.
+"""Half cheetah, hopper, walker, swimmer and humanoid: their families of bodies, and their envs.
 
 All models are Gymnasium's (MIT).
 """
@@ -20,13 +20,21 @@ try:
     import mujoco
     from gymnasium.envs.mujoco.half_cheetah_v5 import HalfCheetahEnv as GymnasiumHalfCheetahEnv
     from gymnasium.envs.mujoco.hopper_v5 import HopperEnv as GymnasiumHopperEnv
+    from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv as GymnasiumHumanoidEnv
     from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv as GymnasiumSwimmerEnv
     from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv as GymnasiumWalker2dEnv
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN, Measure
-from shapechanger.envs.layouts import position_features, velocity_features
+from shapechanger.envs.layouts import (
+    contact_features,
+    drive_features,
+    inertia_features,
+    position_features,
+    twist_features,
+    velocity_features,
+)
 from shapechanger.envs.odrl import published
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
@@ -55,6 +63,7 @@ HOPPER: Final = _runner("Hopper", {"leg": ("thigh", "leg", "foot")})
 _LEFT: Final = ("thigh_left", "leg_left", "foot_left")
 WALKER2D: Final = _runner("Walker2d", {"right leg": ("thigh", "leg", "foot"), "left leg": _LEFT})
 SWIMMER: Final = Family("Swimmer", {"Swimmer": ()})
+HUMANOID: Final = Family("Humanoid", {"Humanoid": ()})
 
 # Limit to which Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
 _CLIPPED_AT: Final = 10.0
@@ -173,43 +182,21 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `HalfCheetah-v5`.
 
     ## Action space
-    `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gears of 120, 90, 60, 120,
-    60 and 30 N·m. An action lasts 0.05 s.
-
-    | Num | Action         | Min | Max | Unit |
-    | --- | -------------- | --- | --- | ---- |
-    | 0   | `bthigh/motor` | -1  | 1   | 1    |
-    | 1   | `bshin/motor`  | -1  | 1   | 1    |
-    | 2   | `bfoot/motor`  | -1  | 1   | 1    |
-    | 3   | `fthigh/motor` | -1  | 1   | 1    |
-    | 4   | `fshin/motor`  | -1  | 1   | 1    |
-    | 5   | `ffoot/motor`  | -1  | 1   | 1    |
+    `Box(-1, 1, (6,), float32)`: torques of the motors at `bthigh`, `bshin`, `bfoot`, `fthigh`,
+    `fshin` and `ffoot`, divided by their gears of 120, 90, 60, 120, 60 and 30 N·m. An action lasts
+    0.05 s.
 
     ## Observation space
-    `Box(-inf, inf, (17,), float64)`, for the unedited body:
-
-    | Num   | Observation      | Min    | Max   | Unit  |
-    | ----- | ---------------- | ------ | ----- | ----- |
-    | 0     | `rootz/position` | -inf   | inf   | m     |
-    | 1     | `rooty/angle`    | -inf   | inf   | rad   |
-    | 2     | `bthigh/angle`   | -0.52  | 1.05  | rad   |
-    | 3     | `bshin/angle`    | -0.785 | 0.785 | rad   |
-    | 4     | `bfoot/angle`    | -0.4   | 0.785 | rad   |
-    | 5     | `fthigh/angle`   | -1     | 0.7   | rad   |
-    | 6     | `fshin/angle`    | -1.2   | 0.87  | rad   |
-    | 7     | `ffoot/angle`    | -0.5   | 0.5   | rad   |
-    | 8     | `rootx/velocity` | -inf   | inf   | m/s   |
-    | 9     | `rootz/velocity` | -inf   | inf   | m/s   |
-    | 10-16 | `*/velocity`     | -inf   | inf   | rad/s |
+    `Box(-inf, inf, (17,), float64)` for the unedited body: height of the torso, m, and its pitch,
+    rad; angles of the joints in the order of the motors, rad; velocity of the torso along x and z,
+    m/s; and angular velocities of torso and joints, rad/s.
 
     ## Reward
     `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.1 sum(action^2)`.
 
     ## Start
-    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
-    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.1) on
-    positions, and normal noise of this standard deviation on velocities. Joints stay inside their
-    limits and feet above the floor.
+    The pose of `Runner`, with uniform noise of `reset_noise_scale` (0.1) on positions, and normal
+    noise of this standard deviation on velocities.
 
     ## End
     Never terminated; truncated after 1,000 steps.
@@ -217,9 +204,6 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ## Info
     `x_position`, m; `x_velocity`, m/s; `reward_forward` and `reward_ctrl`. `diverged` if the
     simulation has diverged.
-
-    ## Versions
-    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
@@ -244,37 +228,20 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `Hopper-v5`.
 
     ## Action space
-    `Box(-1, 1, (3,), float32)`: torques of the motors divided by their gear of 200 N·m. An action
-    lasts 0.008 s.
-
-    | Num | Action              | Min | Max | Unit |
-    | --- | ------------------- | --- | --- | ---- |
-    | 0   | `thigh_joint/motor` | -1  | 1   | 1    |
-    | 1   | `leg_joint/motor`   | -1  | 1   | 1    |
-    | 2   | `foot_joint/motor`  | -1  | 1   | 1    |
+    `Box(-1, 1, (3,), float32)`: torques of the motors at `thigh_joint`, `leg_joint` and
+    `foot_joint`, divided by their gear of 200 N·m. An action lasts 0.008 s.
 
     ## Observation space
-    `Box(-inf, inf, (11,), float64)`, for the unedited body:
-
-    | Num  | Observation         | Min     | Max    | Unit  |
-    | ---- | ------------------- | ------- | ------ | ----- |
-    | 0    | `rootz/position`    | -inf    | inf    | m     |
-    | 1    | `rooty/angle`       | -inf    | inf    | rad   |
-    | 2    | `thigh_joint/angle` | -2.618  | 0      | rad   |
-    | 3    | `leg_joint/angle`   | -2.618  | 0      | rad   |
-    | 4    | `foot_joint/angle`  | -0.7854 | 0.7854 | rad   |
-    | 5    | `rootx/velocity`    | -10     | 10     | m/s   |
-    | 6    | `rootz/velocity`    | -10     | 10     | m/s   |
-    | 7-10 | `*/velocity`        | -10     | 10     | rad/s |
+    `Box(-inf, inf, (11,), float64)` for the unedited body: height of the torso, m, and its pitch,
+    rad; angles of the joints in the order of the motors, rad; velocity of the torso along x and z,
+    m/s; and angular velocities of torso and joints, rad/s. Velocities are clipped to [-10, 10].
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost`: 1 while healthy, plus the velocity along x, m/s,
     minus `0.001 sum(action^2)`.
 
     ## Start
-    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
-    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.005). Joints
-    stay inside their limits and feet above the floor.
+    The pose of `Runner`, with uniform noise of `reset_noise_scale` (0.005).
 
     ## End
     Terminated when the torso is below 0.7 m or leans by more than 0.2 rad, or a number of the state
@@ -284,9 +251,6 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ## Info
     `x_position`, and `z_distance_from_origin`, m; `x_velocity`, m/s; `reward_forward`,
     `reward_ctrl` and `reward_survive`. `diverged` if the simulation has diverged.
-
-    ## Versions
-    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
@@ -307,43 +271,21 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `Walker2d-v5`.
 
     ## Action space
-    `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gear of 100 N·m. An action
-    lasts 0.008 s.
-
-    | Num | Action                   | Min | Max | Unit |
-    | --- | ------------------------ | --- | --- | ---- |
-    | 0   | `thigh_joint/motor`      | -1  | 1   | 1    |
-    | 1   | `leg_joint/motor`        | -1  | 1   | 1    |
-    | 2   | `foot_joint/motor`       | -1  | 1   | 1    |
-    | 3   | `thigh_left_joint/motor` | -1  | 1   | 1    |
-    | 4   | `leg_left_joint/motor`   | -1  | 1   | 1    |
-    | 5   | `foot_left_joint/motor`  | -1  | 1   | 1    |
+    `Box(-1, 1, (6,), float32)`: torques of the motors at `thigh_joint`, `leg_joint`, `foot_joint`
+    and at the same joints of the left leg, divided by their gear of 100 N·m. An action lasts
+    0.008 s.
 
     ## Observation space
-    `Box(-inf, inf, (17,), float64)`, for the unedited body:
-
-    | Num   | Observation              | Min     | Max    | Unit  |
-    | ----- | ------------------------ | ------- | ------ | ----- |
-    | 0     | `rootz/position`         | -inf    | inf    | m     |
-    | 1     | `rooty/angle`            | -inf    | inf    | rad   |
-    | 2     | `thigh_joint/angle`      | -2.618  | 0      | rad   |
-    | 3     | `leg_joint/angle`        | -2.618  | 0      | rad   |
-    | 4     | `foot_joint/angle`       | -0.7854 | 0.7854 | rad   |
-    | 5     | `thigh_left_joint/angle` | -2.618  | 0      | rad   |
-    | 6     | `leg_left_joint/angle`   | -2.618  | 0      | rad   |
-    | 7     | `foot_left_joint/angle`  | -0.7854 | 0.7854 | rad   |
-    | 8     | `rootx/velocity`         | -10     | 10     | m/s   |
-    | 9     | `rootz/velocity`         | -10     | 10     | m/s   |
-    | 10-16 | `*/velocity`             | -10     | 10     | rad/s |
+    `Box(-inf, inf, (17,), float64)` for the unedited body: height of the torso, m, and its pitch,
+    rad; angles of the joints in the order of the motors, rad; velocity of the torso along x and z,
+    m/s; and angular velocities of torso and joints, rad/s. Velocities are clipped to [-10, 10].
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost`: 1 while healthy, plus the velocity along x, m/s,
     minus `0.001 sum(action^2)`.
 
     ## Start
-    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
-    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.005). Joints
-    stay inside their limits and feet above the floor.
+    The pose of `Runner`, with uniform noise of `reset_noise_scale` (0.005).
 
     ## End
     Terminated when the torso is below 0.8 m or above 2 m, or leans by more than 1 rad. For other
@@ -352,9 +294,6 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ## Info
     `x_position`, and `z_distance_from_origin`, m; `x_velocity`, m/s; `reward_forward`,
     `reward_ctrl` and `reward_survive`. `diverged` if the simulation has diverged.
-
-    ## Versions
-    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
@@ -375,25 +314,13 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `Swimmer-v5`.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
-    lasts 0.04 s.
-
-    | Num | Action             | Min | Max | Unit |
-    | --- | ------------------ | --- | --- | ---- |
-    | 0   | `motor1_rot/motor` | -1  | 1   | 1    |
-    | 1   | `motor2_rot/motor` | -1  | 1   | 1    |
+    `Box(-1, 1, (2,), float32)`: torques of the motors at the two joints, divided by their gear of
+    150 N·m. An action lasts 0.04 s.
 
     ## Observation space
-    `Box(-inf, inf, (8,), float64)`, for the unedited body:
-
-    | Num | Observation           | Min    | Max   | Unit  |
-    | --- | --------------------- | ------ | ----- | ----- |
-    | 0   | `free_body_rot/angle` | -inf   | inf   | rad   |
-    | 1   | `motor1_rot/angle`    | -1.745 | 1.745 | rad   |
-    | 2   | `motor2_rot/angle`    | -1.745 | 1.745 | rad   |
-    | 3   | `slider1/velocity`    | -inf   | inf   | m/s   |
-    | 4   | `slider2/velocity`    | -inf   | inf   | m/s   |
-    | 5-7 | `*/velocity`          | -inf   | inf   | rad/s |
+    `Box(-inf, inf, (8,), float64)` for the unedited body: angle of the first link and of both
+    joints, rad; velocity of the first link along x and y, m/s; and its angular velocity and the
+    joints', rad/s.
 
     ## Reward
     `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.0001 sum(action^2)`.
@@ -409,9 +336,6 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
     `reward_forward` and `reward_ctrl`. `diverged` if the simulation has diverged.
 
-    ## Versions
-    v1: the first.
-
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
         **arguments: All arguments of `Swimmer-v5` and of `Reshapable`.
@@ -419,3 +343,67 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     family = SWIMMER
     place_size = 2
+
+
+class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
+    HealthyRunner, GymnasiumHumanoidEnv
+):
+    """Walk forwards on two legs with arms and a waist: `Humanoid-v5` with an editable body.
+
+    Actions, observations, rewards and infos are equal to `Humanoid-v5`.
+
+    ## Action space
+    `Box(-0.4, 0.4, (17,), float32)`: torques of the motors divided by their gears: 100 N·m for the
+    waist and the hips' x and z axes, 300 N·m for their y axes, 200 N·m for the knees, and 25 N·m
+    for the arms. An action lasts 0.015 s.
+
+    ## Observation space
+    `Box(-inf, inf, (348,), float64)` for the unedited body: height, m, and orientation of the torso
+    as a quaternion; angles of the joints, rad; velocity, m/s, and angular velocity, rad/s, of the
+    torso; velocities of the joints, rad/s; inertia (kg·m², kg·m, kg) and twist (rad/s, m/s) of each
+    body; torques of the motors at the joints, N·m; and contact torque and force on each body, N·m
+    and N.
+
+    ## Reward
+    `healthy_reward + forward_reward - ctrl_cost - contact_cost`: 5 while healthy, plus 1.25 times
+    the velocity of the centre of mass along x, m/s, minus `0.1 sum(action^2)`, minus `5e-7
+    sum(force^2)` of the contact forces and torques, which is at most 10.
+
+    ## Start
+    The pose of `Runner`, with uniform noise of `reset_noise_scale` (0.01). The knees start at their
+    limit, bent by 2 degrees, whereas Gymnasium's start straight.
+
+    ## End
+    Terminated when the torso is below 1 m or above 2 m. For other bodies these heights scale with
+    their standing height. Truncated after 1,000 steps.
+
+    ## Info
+    `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
+    `tendon_length`, m, and `tendon_velocity`, m/s; `reward_forward`, `reward_ctrl`,
+    `reward_contact` and `reward_survive`. `diverged` if the simulation has diverged.
+
+    Args:
+        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
+        healthy_z_range: Heights of the torso between which the body is healthy, m; None
+            derives them from the body.
+        **arguments: All other arguments of `Humanoid-v5` and of `Reshapable`.
+    """
+
+    family = HUMANOID
+    root = ("free",)
+    place_size = 2
+
+    def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
+        blocks = {
+            "cinert": inertia_features,
+            "cvel": twist_features,
+            "qfrc_actuator": drive_features,
+            "cfrc_ext": contact_features,
+        }
+        seen = {name: arguments.get(f"include_{name}_in_observation", True) for name in blocks}
+        self._blocks = [features for name, features in blocks.items() if seen[name]]
+        super()._begin(body, arguments)
+
+    def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
+        features = super()._observation_features(model)
+        return features + [feature for block in self._blocks for feature in block(model)]

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from typing_extensions import override
 
-from shapechanger.envs.ant import AntEnv, ExtendedAntEnv, is_upright
-from shapechanger.envs.humanoid import HumanoidEnv
+from shapechanger.envs.ant import AntEnv, is_upright
 from shapechanger.envs.pendulum import (
     CLIPPED_AT,
     FALLEN_M,
@@ -26,7 +25,13 @@ from shapechanger.envs.pendulum import (
     InvertedDoublePendulumEnv,
     InvertedPendulumEnv,
 )
-from shapechanger.envs.runners import HalfCheetahEnv, HopperEnv, SwimmerEnv, Walker2dEnv
+from shapechanger.envs.runners import (
+    HalfCheetahEnv,
+    HopperEnv,
+    HumanoidEnv,
+    SwimmerEnv,
+    Walker2dEnv,
+)
 from shapechanger.envs.warp.bodies import geom_type
 from shapechanger.envs.warp.kernels import uniforms
 from shapechanger.envs.warp.worlds import Infos, Worlds
@@ -372,7 +377,6 @@ class DeviceHumanoid(DeviceRunner):
 
 TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
     AntEnv: DeviceAnt,
-    ExtendedAntEnv: DeviceAnt,
     InvertedPendulumEnv: DevicePendulum,
     InvertedDoublePendulumEnv: DeviceDoublePendulum,
     HalfCheetahEnv: DeviceCheetah,
