@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from numbers import Real
 from typing import Any, Final, cast
 
@@ -137,41 +137,30 @@ def _mismatch(default: Any, value: Any) -> str:
     return ""
 
 
-def require_boxes(env: gym.Env[Any, Any]) -> None:
-    """Require Box spaces.
+def require_same_boxes(envs: Sequence[gym.Env[Any, Any]]) -> None:
+    """Require Box spaces, and the same spaces and layouts of all envs.
 
     Raises:
         VectorEnvError: If a space is not a Box.
-    """
-    for side, space in (("observation", env.observation_space), ("action", env.action_space)):
-        if not isinstance(space, gym.spaces.Box):
-            raise VectorEnvError(
-                f"The {side} space of a vector env must be a Box, and this is {space}: use "
-                "`gymnasium.make_vec` with vectorization_mode='sync'."
-            )
-
-
-def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
-    """Require that all envs have the same spaces and layouts.
-
-    Raises:
         SpaceMismatch: If a space, or the names of its numbers, differ from the first env's.
     """
-    for number, env in enumerate(envs[1:], 1):
-        for side in ("observation", "action"):
-            (ours, names), (theirs, others) = (_space(one, side) for one in (envs[0], env))
-            if ours == theirs and names == others:
+    for side in ("observation", "action"):
+        space, names = _space(envs[0], side)
+        for number, env in enumerate(envs):
+            other, others = _space(env, side)
+            if not isinstance(other, gym.spaces.Box):
+                raise VectorEnvError(
+                    f"The {side} space of a vector env must be a Box, and this is {other}: use "
+                    "`gymnasium.make_vec` with vectorization_mode='sync'."
+                )
+            if other == space and others == names:
                 continue
-            how = "other bounds than"
-            if ours.shape != theirs.shape:
-                how = f"{math.prod(theirs.shape)} numbers, not {math.prod(ours.shape)} like"
-            elif names != others:
-                apart = next((a, b) for a, b in zip(names, others, strict=True) if a != b)
-                how = f"{apart[1]!r}, not {apart[0]!r} like"
+            apart = [pair for pair in zip_longest(others, names) if len({*pair}) > 1]
+            theirs, ours = apart[0] if apart else (f"{other}", f"{space}")
             raise SpaceMismatch(
-                f"The {side} space of env {number} ({describe_body(env)}) has {how} env 0 "
-                f"({describe_body(envs[0])}): the envs of a vector env share their spaces, so make "
-                "one vector env for each kind of body."
+                f"The {side} space of env {number} ({describe_body(env)}) has {theirs} and not "
+                f"{ours} like env 0 ({describe_body(envs[0])}): the envs of a vector env share "
+                "their spaces, so make one vector env for each kind of body."
             )
 
 

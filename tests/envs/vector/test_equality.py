@@ -40,8 +40,6 @@ def _pair(env_id: str, bodies: list[Any], threads: int, mode: str, **more: Any) 
 
 def _compare(env_id: str, threads: int, mode: str, steps: int, clock: int) -> int:
     bodies = [gym.spec(env_id).kwargs.get("body"), *random_bodies(env_id, 5)]
-    if bodies[0] is None:
-        bodies[0] = "ExtendedAnt"
     ours, theirs = _pair(env_id, bodies, threads, mode, max_episode_steps=clock)
     try:
         return play_side_by_side(ours, theirs, steps, mode)

@@ -74,8 +74,8 @@ def test_columns_are_batched_alike(kinds: list[int], order: Any) -> None:
 def test_columns_are_split_by_env() -> None:
     """A single result replaces the columns' info of its env."""
     results = StepResults(2)
-    infos = InfoColumns([0, 1], {"a": np.array([1.0, 2.0])})
-    results.put_columns(infos, np.zeros(2), np.zeros(2, np.bool_), [False, False])
+    ends = np.zeros(2, np.bool_)
+    results.put_columns([0, 1], np.zeros(2), ends, ends, {"a": np.array([1.0, 2.0])})
     assert results.of_each()[1] == {"a": 2.0}
     results.put(0, (0.5, True, False, {"diverged": True}))
     assert results.of_each() == [{"diverged": True}, {"a": 2.0}]

@@ -165,7 +165,7 @@ def test_a_second_interruption_does_not_wait() -> None:
     presser = threading.Thread(target=press_on)
     presser.start()
     with pytest.raises(KeyboardInterrupt):
-        pool.share([lambda _: None, lambda _: work()])
+        pool.do(lambda number: work() if number else None, range(2))
     presser.join()
     assert presses >= 2
     assert pool.lost

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import threading
 import weakref
-from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext, suppress
-from functools import partial
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import contextmanager, nullcontext
 from typing import Any, cast
 
 import gymnasium as gym
@@ -20,17 +18,10 @@ from shapechanger.envs.checks import (
     check_actions,
     masked_options,
     one_seed_each,
-    require_boxes,
-    require_same_spaces,
+    require_same_boxes,
 )
-from shapechanger.envs.vector.results import (
-    InfoColumns,
-    StepResults,
-    SubEnv,
-    batched,
-    in_columns,
-)
-from shapechanger.envs.vector.threads import EnvThreads, Failures, attempt
+from shapechanger.envs.vector.results import StepResults, SubEnv, batched, in_columns
+from shapechanger.envs.vector.threads import EnvThreads
 from shapechanger.errors import VectorEnvError
 
 _Floats = NDArray[np.float64]
@@ -88,8 +79,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         try:
             for maker in makers:
                 self.envs.append(maker())
-            require_boxes(self.envs[0])
-            require_same_spaces(self.envs)
+            require_same_boxes(self.envs)
         except BaseException:
             for env in self.envs:
                 env.close()
@@ -135,12 +125,11 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             TypeError: If the mask is not an array of booleans.
             ValueError: If the mask has another shape, or is all false.
         """
-        self._require_open()
-        seeds = one_seed_each(seed, self.num_envs)
         mask, options = masked_options(options, self.num_envs)
         if mask is not None and self._awaits_reset and not mask.all():
             raise gym.error.ResetNeeded("No episode is under way: call `reset` without a mask.")
         chosen = None if mask is None else np.flatnonzero(mask).tolist()
+        seeds = one_seed_each(seed, self.num_envs)
         observations, infos = self.reset_each(seeds, [options] * self.num_envs, chosen)
         return observations, batched(self, in_columns(dict(enumerate(infos))))
 
@@ -155,7 +144,6 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         Returns:
             The observations of all envs, and the info of each, empty if it was not reset.
         """
-        self._require_open()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         numbers = list(range(self.num_envs) if chosen is None else chosen)
         changes_bodies = any(given and "body" in given for given in options)
@@ -166,8 +154,11 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             with compiling:
                 infos[i] = self._subs[i].reset(seeds[i], options[i])
 
-        run = self._at_home if changes_bodies else self._threads.do
-        self._guarded(lambda: run(start, numbers))
+        with self._stepping():
+            if changes_bodies:
+                self._at_home(start, numbers)
+            else:
+                self._threads.do(start, numbers)
         self._ended[numbers] = False
         return self._present_observations(), infos
 
@@ -201,7 +192,8 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
                 "call `reset` with options={'reset_mask': terminations | truncations}."
             )
         results = StepResults(self.num_envs)
-        self._guarded(lambda: self._advance(given, waiting.tolist(), results))
+        with self._stepping():
+            self._advance(given, waiting.tolist(), results)
         self._ended = results.terminated | results.truncated
         return self._present_observations(), results
 
@@ -227,20 +219,10 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             bound.ctrl[:] = actions[i]
             bound.move()
 
-        # Threads rarely take equally long, so they take envs from the two ends of a deque, which
-        # hands out each once. Envs that may draw must stay in their thread.
-        queue = deque(i for i in range(self.num_envs) if self._subs[i].tuned is not None)
-
-        def work(thread: int, failures: Failures) -> None:
-            for i in self._threads.parts[thread]:
-                if self._subs[i].tuned is None:
-                    attempt(advance, i, failures)
-            take = queue.pop if thread % 2 else queue.popleft
-            with suppress(IndexError):  # All envs have been taken.
-                while True:
-                    attempt(advance, take(), failures)
-
-        self._threads.share([partial(work, thread) for thread in range(self.threads)])
+        # Envs that may draw must stay in their thread.
+        others = [i for i, sub in enumerate(self._subs) if sub.tuned is None]
+        tuned = [i for i, sub in enumerate(self._subs) if sub.tuned is not None]
+        self._threads.do(advance, others, anywhere=tuned)
         kinds: dict[str, list[int]] = {}
         for i, one in enumerate(moved):
             if one is not None:
@@ -273,17 +255,17 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         Returns:
             Numbers of the envs whose simulation has diverged.
         """
-        subs = [self._subs[i] for i in numbers]
         everyone = len(numbers) == self.num_envs
         where: Any = slice(None) if everyone else numbers
         bounds, before = zip(*[moved[i] for i in numbers], strict=True)
+        subs = [self._subs[i] for i in numbers]
         observations, rewards, terminated, infos = cast("Any", subs[0].tuned).conclude(
             bounds, before, actions[where], self._observations if everyone else None
         )
         if not everyone:
             self._observations[where] = observations
         truncated = [sub.tick() for sub in subs]
-        results.put_columns(InfoColumns(numbers, infos), rewards, terminated, truncated)
+        results.put_columns(numbers, rewards, terminated, truncated, infos)
         warnings = np.concatenate([bound.warnings for bound in bounds])
         if not warnings.any():
             return []
@@ -364,11 +346,13 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         if self.closed:
             raise gym.error.ClosedEnvironmentError("This vector env is closed: make another one.")
 
-    def _guarded(self, work: Callable[[], None]) -> None:
-        """Let the threads work; if that fails, the envs must be reset."""
+    @contextmanager
+    def _stepping(self) -> Generator[None]:
+        """Let the threads work on an open vector env; if that fails, the envs must be reset."""
+        self._require_open()
         self._awaits_reset = True
         try:
-            work()
+            yield
         finally:
             # Closing envs that threads still work on is not safe.
             self.closed = self._threads.lost

@@ -95,14 +95,13 @@ class StepResults:
         self._infos[number] = info
 
     def put_columns(
-        self, infos: InfoColumns, rewards: Any, terminated: Any, truncated: Any
+        self, numbers: Sequence[int], rewards: Any, terminated: Any, truncated: Any, infos: Any
     ) -> None:
-        """Set the results of several envs, an array each; their numbers come with their infos."""
-        everyone = len(infos.numbers) == self.rewards.size
-        where: Any = slice(None) if everyone else infos.numbers
+        """Set the results of several envs, an array each, and their infos in columns."""
+        where: Any = slice(None) if len(numbers) == self.rewards.size else numbers
         self.rewards[where], self.terminated[where] = rewards, terminated
         self.truncated[where] = truncated
-        self._columns.append(infos)
+        self._columns.append(InfoColumns(numbers, infos))
 
     def of_each(self) -> list[dict[str, Any]]:
         """Return the info of each env."""

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import pairwise
 from queue import SimpleQueue
 from typing import Final
 
-Failures = list[tuple[int, Exception]]
-"""Exceptions, each with the number of the env that raised it."""
-
-# A job of a worker, with the queue that receives its exception, or None.
-_Answers = SimpleQueue[BaseException | None]
-_Task = tuple[Callable[[], None], _Answers]
+# A job of a worker, with the queue that receives None at its end.
+_Task = tuple[Callable[[], None], SimpleQueue[None]]
 
 # Time limit for the end of a thread, s; it only has to finish a step.
 _END_WITHIN_S: Final = 5.0
 
 
 class _Worker(threading.Thread):
-    """A thread that runs tasks until None arrives in its inbox."""
+    """A thread that runs tasks, which do not raise, until None arrives in its inbox."""
 
     def __init__(self) -> None:
         # A daemon thread, so that a program that does not close its envs can still exit.
@@ -31,15 +28,10 @@ class _Worker(threading.Thread):
 
     def run(self) -> None:
         while (task := self.inbox.get()) is not None:
-            job, answers = task
-            answer: BaseException | None = None
-            try:
-                job()
-            except BaseException as error:  # Raised again in the caller's thread.
-                answer = error
+            job, done = task
+            job()
             del task, job  # A waiting thread must not keep the job's objects alive.
-            answers.put(answer)
-            del answer, answers
+            done.put(None)
 
 
 class EnvThreads:
@@ -54,77 +46,84 @@ class EnvThreads:
         num_envs: How many envs there are.
 
     Attributes:
-        parts: The numbers of each thread's envs, the caller's first.
         lost: Whether an interruption left threads running; do not touch their envs.
     """
 
     def __init__(self, threads: int, num_envs: int) -> None:
         ends = [num_envs * part // threads for part in range(threads + 1)]
-        self.parts = [range(a, b) for a, b in pairwise(ends)]
+        self._parts = [range(a, b) for a, b in pairwise(ends)]
         self.lost = False
         self._workers: list[_Worker] = []
 
     def do(
-        self, work: Callable[[int], object], numbers: Iterable[int], *, alone: bool = False
+        self,
+        work: Callable[[int], object],
+        numbers: Iterable[int],
+        *,
+        anywhere: Iterable[int] = (),
+        alone: bool = False,
     ) -> None:
-        """Do `work` for the envs of some numbers, each in its own thread; return at its end.
+        """Do `work` for the envs of some numbers, and return when all of it has ended.
 
         Args:
             work: Takes the number of an env.
-            numbers: Numbers of the envs.
+            numbers: Numbers of envs whose thread must do it.
+            anywhere: Numbers of envs that the first free thread takes.
             alone: Whether the caller's thread does all of it.
 
         Raises:
-            Exception: The exception of the first env that failed, with a note that names the env;
-                the work is done for all others.
+            BaseException: The exception of the first env that failed, with a note that names the
+                env; the work is done for all others.
         """
-        chosen = list(numbers)
-        parts = [chosen] if alone else [[i for i in chosen if i in part] for part in self.parts]
+        chosen, queue = list(numbers), deque(anywhere)
+        parts = [chosen] if alone else [[i for i in chosen if i in part] for part in self._parts]
+        failures: list[tuple[int, BaseException]] = []
 
-        def work_through(part: Sequence[int], failures: Failures) -> None:
-            for number in part:
-                attempt(work, number, failures)
-
-        self.share([partial(work_through, part) for part in parts])
-
-    def share(self, jobs: Sequence[Callable[[Failures], None]]) -> None:
-        """Run one job per thread, the first in the caller's, and return when all have ended.
-
-        Each job appends what its envs raise to a list.
-
-        Raises:
-            Exception: As in `do`.
-            BaseException: The exception of a job itself, such as KeyboardInterrupt.
-        """
-        failures: Failures = []
-        first, *others = [partial(job, failures) for job in jobs]
-        workers = self._awake() if others else []
-        answers = _Answers()
-        try:
-            for worker, job in zip(workers, others, strict=True):
-                worker.inbox.put((job, answers))
-            first()
-            errors = [answers.get() for _ in workers]
-        except BaseException:
-            # It is unknown which jobs were handed over, so wait until each thread has done an empty
-            # job.
-            settled = _Answers()
+        def attempt(number: int) -> None:
             try:
-                for worker in workers:
-                    worker.inbox.put((lambda: None, settled))
-                for _ in workers:
-                    settled.get()
-            except BaseException:  # A second interruption ends the wait.
-                self.lost = True
-                raise
+                work(number)
+            except BaseException as error:  # Raised again below, in the caller's thread.
+                failures.append((number, error))
+
+        def work_through(thread: int) -> None:
+            for number in parts[thread]:
+                attempt(number)
+            # Threads rarely take equally long. They take envs from both ends, each env once.
+            take = queue.pop if thread % 2 else queue.popleft
+            while True:
+                try:
+                    number = take()
+                except IndexError:  # All envs have been taken.
+                    return
+                attempt(number)
+
+        workers = [] if alone else self._awake()
+        done: SimpleQueue[None] = SimpleQueue()
+        try:
+            for thread, worker in enumerate(workers, 1):
+                worker.inbox.put((partial(work_through, thread), done))
+            work_through(0)
+            for _ in workers:
+                done.get()
+        except BaseException:  # It is unknown which jobs were handed over.
+            self._settle(workers)
             raise
-        for error in errors:
-            if error is not None:
-                raise error
         if failures:
             number, failure = min(failures, key=lambda failure: failure[0])
             failure.add_note(f"This was raised by env {number} of the vector env.")
             raise failure
+
+    def _settle(self, workers: list[_Worker]) -> None:
+        """Wait until each thread has done an empty job, unless a second interruption ends it."""
+        settled: SimpleQueue[None] = SimpleQueue()
+        try:
+            for worker in workers:
+                worker.inbox.put((lambda: None, settled))
+            for _ in workers:
+                settled.get()
+        except BaseException:
+            self.lost = True
+            raise
 
     def stop(self) -> None:
         """End the threads; the next work starts new ones."""
@@ -139,14 +138,6 @@ class EnvThreads:
         """Return the threads, started if they are not alive."""
         if not all(worker.is_alive() for worker in self._workers):
             self._workers = []  # pragma: no cover  # After a fork; tested in a subprocess.
-        while len(self._workers) < len(self.parts) - 1:
+        while len(self._workers) < len(self._parts) - 1:
             self._workers.append(_Worker())
         return self._workers
-
-
-def attempt(work: Callable[[int], object], number: int, failures: Failures) -> None:
-    """Do `work` for one env, and record its exception, which the caller's thread raises."""
-    try:
-        work(number)
-    except Exception as error:
-        failures.append((number, error))
