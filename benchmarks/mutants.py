@@ -15,6 +15,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -36,7 +37,8 @@ MODULES: Final = {
     "edits": "morphology/edits",
     "certificate": "morphology/certificate",
 }
-_SRC: Final = Path("mutants", "src", "shapechanger")
+_FOLDER: Final = Path("mutants")
+_SRC: Final = _FOLDER / "src" / "shapechanger"
 _EQUIVALENT: Final = Path(__file__).with_name("equivalent_mutants.toml")
 _PAGE: Final = Path("docs", "mutants.md")
 _ALIVE: Final = (0, 5, 33)  # Exit codes: no test failed, or none calls the function.
@@ -58,9 +60,11 @@ def mutants() -> Iterator[Row]:
     patterns = [f"shapechanger.{MODULES[name].replace('/', '.')}*" for name in chosen]
     children = str(os.cpu_count() or 1)
     command = [sys.executable, "-m", "mutmut", "run", "--max-children", children, *patterns]
+    shutil.rmtree(_FOLDER / "tests", ignore_errors=True)  # mutmut keeps tests that were deleted.
     run = subprocess.run(command, check=False, capture_output=True, text=True)
     if run.returncode:
-        raise RuntimeError(f"mutmut stopped with {run.returncode}: {run.stdout}{run.stderr}")
+        last = (run.stdout + run.stderr)[-2000:]
+        raise RuntimeError(f"mutmut stopped with {run.returncode}: {last}")
     equivalent = {
         (one["function"], one["line"]) for one in tomllib.loads(_EQUIVALENT.read_text())["mutant"]
     }
