@@ -128,9 +128,8 @@ def test_the_share_of_speed_that_policies_of_limbs_keep():
         kept[network] = {key: f"{100 * one / speed['train']:.0f}" for key, one in speed.items()}
     ours = [kept["limbs"][key] for key in ("interpolation", "extrapolation", "composition")]
     assert (
-        "it keeps {} % in interpolation, {} % in extrapolation and {} % in composition".format(
-            *ours
-        )
+        "keeps {} % of its speed in the training bodies in interpolation, {} % in extrapolation "
+        "and {} % in composition".format(*ours)
         in text
     )
     theirs = [kept["padded"][key] for key in ("interpolation", "extrapolation", "composition")]

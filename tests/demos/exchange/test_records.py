@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Step
+from shapechanger.demos.episodes.records import longest_period_s
 from shapechanger.demos.exchange import ExchangeEpisode, ExchangeRecord, ImportContext
 from shapechanger.demos.exchange.base import drives, whole_records
 from shapechanger.demos.exchange.files import load_jpeg
@@ -120,4 +121,5 @@ def test_drives_are_whole_records_in_order_of_one_size_and_without_jumps(
         if head.clock == "none":
             assert times == [None] * len(times)
         else:
-            assert all(0 <= later - now <= 30e9 for now, later in pairwise(times))
+            longest_ns = 1e9 * longest_period_s(head.control_hz)
+            assert all(0 <= later - now <= longest_ns for now, later in pairwise(times))

@@ -160,7 +160,7 @@ def test_actions_are_ignored_at_an_autoreset() -> None:
         ([True, False, True], TypeError, "not of list"),
         (np.array([1, 0, 1]), TypeError, "not of int64"),
         (np.array([True]), ValueError, r"shape \(3,\).*got \[ True\]"),
-        (np.zeros(3, np.bool_), ValueError, "true for an env, got"),
+        (np.zeros(3, np.bool_), ValueError, "select an env, got"),
     ],
 )
 def test_invalid_masks_are_refused(
