@@ -96,8 +96,7 @@ def _environment(env_id: str) -> tuple[str, bytes | None]:
     # The others need a robot or a file.
     if not short.startswith("Remote") and env_id != OWN_ROBOT:
         with EnvRef(env_id).make() as env:
-            if "| Num" not in (inspect.getdoc(type(env.unwrapped)) or ""):
-                numbers = _numbers(env)
+            numbers = _numbers(env)
             try:
                 if hasattr(env.unwrapped, "picture"):
                     env.reset(seed=0)
@@ -131,11 +130,15 @@ def _environment(env_id: str) -> tuple[str, bytes | None]:
 
 
 def _numbers(env: gym.Env[Any, Any]) -> str:
-    """Return the tables of the numbers of both spaces of an env."""
+    """Return the tables of both spaces of an env whose docstring describes another body."""
+    described = inspect.getdoc(type(env.unwrapped)) or ""
+    observation, action = layouts_of(env)
     sections: list[str] = []
-    for layout, title in zip(layouts_of(env), ("Observation", "Action"), strict=True):
+    for layout, title in ((observation, "Observation"), (action, "Action")):
         if layout is not None:
             rows = layout_rows(layout, title)
+            if "| Num" in described and (len(layout) == 1 or f"| {rows[-1][0]} " in described):
+                break
             sections += [f"## {title}s", table(("Num", title, "Min", "Max", "Unit"), rows)]
     return _page(*sections)
 

@@ -143,7 +143,8 @@ def test_the_share_of_speed_that_policies_of_limbs_keep():
     before = [*ours, kept["limbs"]["extended"]]
     both = [one for two in zip(share, before, strict=True) for one in two]
     expected = (
-        "keeps {} % in interpolation ({} % with 32 ants), {} % in extrapolation ({} %), "
+        "keeps {} % of its speed in the training bodies in interpolation ({} % with 32 ants), "
+        "{} % in extrapolation ({} %), "
         "{} % in compositions ({} %), and {} % with 12 joints ({} %)"
     )
     assert expected.format(*both) in text

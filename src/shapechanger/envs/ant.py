@@ -144,14 +144,46 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     larger spaces.
 
     ## Action space
-    `Box(-1, 1, (8,), float32)`: torques of the motors at hip and ankle of the legs 4, 1, 2 and 3,
-    divided by their gear of 150 N·m. An action lasts 0.05 s.
+    `Box(-1, 1, (8,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
+    lasts 0.05 s.
+
+    | Num | Action          | Min | Max | Unit |
+    | --- | --------------- | --- | --- | ---- |
+    | 0   | `hip_4/motor`   | -1  | 1   | 1    |
+    | 1   | `ankle_4/motor` | -1  | 1   | 1    |
+    | 2   | `hip_1/motor`   | -1  | 1   | 1    |
+    | 3   | `ankle_1/motor` | -1  | 1   | 1    |
+    | 4   | `hip_2/motor`   | -1  | 1   | 1    |
+    | 5   | `ankle_2/motor` | -1  | 1   | 1    |
+    | 6   | `hip_3/motor`   | -1  | 1   | 1    |
+    | 7   | `ankle_3/motor` | -1  | 1   | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (105,), float64)` for the unedited body: height, m, and orientation of the
-    torso as a quaternion; angles of the joints, rad; velocity, m/s, and angular velocity, rad/s, of
-    the torso; velocities of the joints, rad/s; and the contact torque and force on each body, N·m
-    and N, clipped to [-1, 1]. Angles and velocities are in the order of the legs 1 to 4.
+    `Box(-inf, inf, (105,), float64)`, for the unedited body:
+
+    | Num    | Observation     | Min     | Max     | Unit   |
+    | ------ | --------------- | ------- | ------- | ------ |
+    | 0      | `torso/z`       | -inf    | inf     | m      |
+    | 1      | `torso/qw`      | -1      | 1       | 1      |
+    | 2      | `torso/qx`      | -1      | 1       | 1      |
+    | 3      | `torso/qy`      | -1      | 1       | 1      |
+    | 4      | `torso/qz`      | -1      | 1       | 1      |
+    | 5      | `hip_1/angle`   | -0.5236 | 0.5236  | rad    |
+    | 6      | `ankle_1/angle` | 0.5236  | 1.222   | rad    |
+    | 7      | `hip_2/angle`   | -0.5236 | 0.5236  | rad    |
+    | 8      | `ankle_2/angle` | -1.222  | -0.5236 | rad    |
+    | 9      | `hip_3/angle`   | -0.5236 | 0.5236  | rad    |
+    | 10     | `ankle_3/angle` | -1.222  | -0.5236 | rad    |
+    | 11     | `hip_4/angle`   | -0.5236 | 0.5236  | rad    |
+    | 12     | `ankle_4/angle` | 0.5236  | 1.222   | rad    |
+    | 13     | `torso/vx`      | -inf    | inf     | m/s    |
+    | 14     | `torso/vy`      | -inf    | inf     | m/s    |
+    | 15     | `torso/vz`      | -inf    | inf     | m/s    |
+    | 16     | `torso/wx`      | -inf    | inf     | rad/s  |
+    | 17     | `torso/wy`      | -inf    | inf     | rad/s  |
+    | 18     | `torso/wz`      | -inf    | inf     | rad/s  |
+    | 19-26  | `*/velocity`    | -inf    | inf     | rad/s  |
+    | 27-104 | `*/contact/*`   | -1      | 1       | N·m, N |
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost - contact_cost`: 1 while healthy, plus the velocity
@@ -173,6 +205,9 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
     `reward_forward`, `reward_ctrl`, `reward_contact` and `reward_survive`. `diverged` if the
     simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of an ant, edits of `shapechanger.morphology`, or their JSON.

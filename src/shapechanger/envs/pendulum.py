@@ -64,9 +64,19 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
     `Box(-3, 3, (1,), float32)`: the force on the cart divided by the motor's gear of 100 N. An
     action lasts 0.04 s.
 
+    | Num | Action        | Min | Max | Unit |
+    | --- | ------------- | --- | --- | ---- |
+    | 0   | `slide/motor` | -3  | 3   | 1    |
+
     ## Observation space
-    `Box(-inf, inf, (4,), float64)`: position of the cart, m, from -1 to 1, and angle
-    of the pole, rad; and their velocities, m/s and rad/s.
+    `Box(-inf, inf, (4,), float64)`, for the unedited body:
+
+    | Num | Observation       | Min    | Max   | Unit  |
+    | --- | ----------------- | ------ | ----- | ----- |
+    | 0   | `slider/position` | -1     | 1     | m     |
+    | 1   | `hinge/angle`     | -1.571 | 1.571 | rad   |
+    | 2   | `slider/velocity` | -inf   | inf   | m/s   |
+    | 3   | `hinge/velocity`  | -inf   | inf   | rad/s |
 
     ## Reward
     `1` for each step after which the pole stands.
@@ -80,6 +90,9 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
 
     ## Info
     `reward_survive`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a pendulum, edits of `shapechanger.morphology`, or their JSON.
@@ -140,10 +153,24 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
     `Box(-1, 1, (1,), float32)`: the force on the cart divided by the motor's gear of 500 N. An
     action lasts 0.05 s.
 
+    | Num | Action        | Min | Max | Unit |
+    | --- | ------------- | --- | --- | ---- |
+    | 0   | `slide/motor` | -1  | 1   | 1    |
+
     ## Observation space
-    `Box(-inf, inf, (9,), float64)`: position of the cart, m, from -1 to 1; sines of
-    the two hinges' angles, then their cosines; velocities of the cart, m/s, and the hinges, rad/s;
-    and the force of the constraint on the cart, N. Velocities and force are clipped to [-10, 10].
+    `Box(-inf, inf, (9,), float64)`, for the unedited body:
+
+    | Num | Observation               | Min | Max | Unit  |
+    | --- | ------------------------- | --- | --- | ----- |
+    | 0   | `slider/position`         | -1  | 1   | m     |
+    | 1   | `hinge/sin`               | -1  | 1   | 1     |
+    | 2   | `hinge2/sin`              | -1  | 1   | 1     |
+    | 3   | `hinge/cos`               | -1  | 1   | 1     |
+    | 4   | `hinge2/cos`              | -1  | 1   | 1     |
+    | 5   | `slider/velocity`         | -10 | 10  | m/s   |
+    | 6   | `hinge/velocity`          | -10 | 10  | rad/s |
+    | 7   | `hinge2/velocity`         | -10 | 10  | rad/s |
+    | 8   | `slider/constraint_force` | -10 | 10  | N     |
 
     ## Reward
     `healthy_reward - distance_penalty - velocity_penalty`: 10 while the poles stand, minus `0.01
@@ -160,6 +187,9 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
     ## Info
     `reward_survive`, `distance_penalty` and `velocity_penalty`. `diverged` if the simulation has
     diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON. It

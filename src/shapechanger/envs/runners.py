@@ -182,21 +182,43 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `HalfCheetah-v5`.
 
     ## Action space
-    `Box(-1, 1, (6,), float32)`: torques of the motors at `bthigh`, `bshin`, `bfoot`, `fthigh`,
-    `fshin` and `ffoot`, divided by their gears of 120, 90, 60, 120, 60 and 30 N·m. An action lasts
-    0.05 s.
+    `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gears of 120, 90, 60, 120,
+    60 and 30 N·m. An action lasts 0.05 s.
+
+    | Num | Action         | Min | Max | Unit |
+    | --- | -------------- | --- | --- | ---- |
+    | 0   | `bthigh/motor` | -1  | 1   | 1    |
+    | 1   | `bshin/motor`  | -1  | 1   | 1    |
+    | 2   | `bfoot/motor`  | -1  | 1   | 1    |
+    | 3   | `fthigh/motor` | -1  | 1   | 1    |
+    | 4   | `fshin/motor`  | -1  | 1   | 1    |
+    | 5   | `ffoot/motor`  | -1  | 1   | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (17,), float64)` for the unedited body: height of the torso, m, and its pitch,
-    rad; angles of the joints in the order of the motors, rad; velocity of the torso along x and z,
-    m/s; and angular velocities of torso and joints, rad/s.
+    `Box(-inf, inf, (17,), float64)`, for the unedited body:
+
+    | Num   | Observation      | Min    | Max   | Unit  |
+    | ----- | ---------------- | ------ | ----- | ----- |
+    | 0     | `rootz/position` | -inf   | inf   | m     |
+    | 1     | `rooty/angle`    | -inf   | inf   | rad   |
+    | 2     | `bthigh/angle`   | -0.52  | 1.05  | rad   |
+    | 3     | `bshin/angle`    | -0.785 | 0.785 | rad   |
+    | 4     | `bfoot/angle`    | -0.4   | 0.785 | rad   |
+    | 5     | `fthigh/angle`   | -1     | 0.7   | rad   |
+    | 6     | `fshin/angle`    | -1.2   | 0.87  | rad   |
+    | 7     | `ffoot/angle`    | -0.5   | 0.5   | rad   |
+    | 8     | `rootx/velocity` | -inf   | inf   | m/s   |
+    | 9     | `rootz/velocity` | -inf   | inf   | m/s   |
+    | 10-16 | `*/velocity`     | -inf   | inf   | rad/s |
 
     ## Reward
     `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.1 sum(action^2)`.
 
     ## Start
-    The pose of `Runner`, with uniform noise of `reset_noise_scale` (0.1) on positions, and normal
-    noise of this standard deviation on velocities.
+    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
+    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.1) on
+    positions, and normal noise of this standard deviation on velocities. Joints stay inside their
+    limits and feet above the floor.
 
     ## End
     Never terminated; truncated after 1,000 steps.
@@ -204,6 +226,9 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ## Info
     `x_position`, m; `x_velocity`, m/s; `reward_forward` and `reward_ctrl`. `diverged` if the
     simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
@@ -228,20 +253,37 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `Hopper-v5`.
 
     ## Action space
-    `Box(-1, 1, (3,), float32)`: torques of the motors at `thigh_joint`, `leg_joint` and
-    `foot_joint`, divided by their gear of 200 N·m. An action lasts 0.008 s.
+    `Box(-1, 1, (3,), float32)`: torques of the motors divided by their gear of 200 N·m. An action
+    lasts 0.008 s.
+
+    | Num | Action              | Min | Max | Unit |
+    | --- | ------------------- | --- | --- | ---- |
+    | 0   | `thigh_joint/motor` | -1  | 1   | 1    |
+    | 1   | `leg_joint/motor`   | -1  | 1   | 1    |
+    | 2   | `foot_joint/motor`  | -1  | 1   | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (11,), float64)` for the unedited body: height of the torso, m, and its pitch,
-    rad; angles of the joints in the order of the motors, rad; velocity of the torso along x and z,
-    m/s; and angular velocities of torso and joints, rad/s. Velocities are clipped to [-10, 10].
+    `Box(-inf, inf, (11,), float64)`, for the unedited body:
+
+    | Num  | Observation         | Min     | Max    | Unit  |
+    | ---- | ------------------- | ------- | ------ | ----- |
+    | 0    | `rootz/position`    | -inf    | inf    | m     |
+    | 1    | `rooty/angle`       | -inf    | inf    | rad   |
+    | 2    | `thigh_joint/angle` | -2.618  | 0      | rad   |
+    | 3    | `leg_joint/angle`   | -2.618  | 0      | rad   |
+    | 4    | `foot_joint/angle`  | -0.7854 | 0.7854 | rad   |
+    | 5    | `rootx/velocity`    | -10     | 10     | m/s   |
+    | 6    | `rootz/velocity`    | -10     | 10     | m/s   |
+    | 7-10 | `*/velocity`        | -10     | 10     | rad/s |
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost`: 1 while healthy, plus the velocity along x, m/s,
     minus `0.001 sum(action^2)`.
 
     ## Start
-    The pose of `Runner`, with uniform noise of `reset_noise_scale` (0.005).
+    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
+    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.005). Joints
+    stay inside their limits and feet above the floor.
 
     ## End
     Terminated when the torso is below 0.7 m or leans by more than 0.2 rad, or a number of the state
@@ -251,6 +293,9 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ## Info
     `x_position`, and `z_distance_from_origin`, m; `x_velocity`, m/s; `reward_forward`,
     `reward_ctrl` and `reward_survive`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
@@ -271,21 +316,43 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `Walker2d-v5`.
 
     ## Action space
-    `Box(-1, 1, (6,), float32)`: torques of the motors at `thigh_joint`, `leg_joint`, `foot_joint`
-    and at the same joints of the left leg, divided by their gear of 100 N·m. An action lasts
-    0.008 s.
+    `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gear of 100 N·m. An action
+    lasts 0.008 s.
+
+    | Num | Action                   | Min | Max | Unit |
+    | --- | ------------------------ | --- | --- | ---- |
+    | 0   | `thigh_joint/motor`      | -1  | 1   | 1    |
+    | 1   | `leg_joint/motor`        | -1  | 1   | 1    |
+    | 2   | `foot_joint/motor`       | -1  | 1   | 1    |
+    | 3   | `thigh_left_joint/motor` | -1  | 1   | 1    |
+    | 4   | `leg_left_joint/motor`   | -1  | 1   | 1    |
+    | 5   | `foot_left_joint/motor`  | -1  | 1   | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (17,), float64)` for the unedited body: height of the torso, m, and its pitch,
-    rad; angles of the joints in the order of the motors, rad; velocity of the torso along x and z,
-    m/s; and angular velocities of torso and joints, rad/s. Velocities are clipped to [-10, 10].
+    `Box(-inf, inf, (17,), float64)`, for the unedited body:
+
+    | Num   | Observation              | Min     | Max    | Unit  |
+    | ----- | ------------------------ | ------- | ------ | ----- |
+    | 0     | `rootz/position`         | -inf    | inf    | m     |
+    | 1     | `rooty/angle`            | -inf    | inf    | rad   |
+    | 2     | `thigh_joint/angle`      | -2.618  | 0      | rad   |
+    | 3     | `leg_joint/angle`        | -2.618  | 0      | rad   |
+    | 4     | `foot_joint/angle`       | -0.7854 | 0.7854 | rad   |
+    | 5     | `thigh_left_joint/angle` | -2.618  | 0      | rad   |
+    | 6     | `leg_left_joint/angle`   | -2.618  | 0      | rad   |
+    | 7     | `foot_left_joint/angle`  | -0.7854 | 0.7854 | rad   |
+    | 8     | `rootx/velocity`         | -10     | 10     | m/s   |
+    | 9     | `rootz/velocity`         | -10     | 10     | m/s   |
+    | 10-16 | `*/velocity`             | -10     | 10     | rad/s |
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost`: 1 while healthy, plus the velocity along x, m/s,
     minus `0.001 sum(action^2)`.
 
     ## Start
-    The pose of `Runner`, with uniform noise of `reset_noise_scale` (0.005).
+    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
+    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.005). Joints
+    stay inside their limits and feet above the floor.
 
     ## End
     Terminated when the torso is below 0.8 m or above 2 m, or leans by more than 1 rad. For other
@@ -294,6 +361,9 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ## Info
     `x_position`, and `z_distance_from_origin`, m; `x_velocity`, m/s; `reward_forward`,
     `reward_ctrl` and `reward_survive`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
@@ -314,13 +384,25 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `Swimmer-v5`.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`: torques of the motors at the two joints, divided by their gear of
-    150 N·m. An action lasts 0.04 s.
+    `Box(-1, 1, (2,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
+    lasts 0.04 s.
+
+    | Num | Action             | Min | Max | Unit |
+    | --- | ------------------ | --- | --- | ---- |
+    | 0   | `motor1_rot/motor` | -1  | 1   | 1    |
+    | 1   | `motor2_rot/motor` | -1  | 1   | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (8,), float64)` for the unedited body: angle of the first link and of both
-    joints, rad; velocity of the first link along x and y, m/s; and its angular velocity and the
-    joints', rad/s.
+    `Box(-inf, inf, (8,), float64)`, for the unedited body:
+
+    | Num | Observation           | Min    | Max   | Unit  |
+    | --- | --------------------- | ------ | ----- | ----- |
+    | 0   | `free_body_rot/angle` | -inf   | inf   | rad   |
+    | 1   | `motor1_rot/angle`    | -1.745 | 1.745 | rad   |
+    | 2   | `motor2_rot/angle`    | -1.745 | 1.745 | rad   |
+    | 3   | `slider1/velocity`    | -inf   | inf   | m/s   |
+    | 4   | `slider2/velocity`    | -inf   | inf   | m/s   |
+    | 5-7 | `*/velocity`          | -inf   | inf   | rad/s |
 
     ## Reward
     `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.0001 sum(action^2)`.
@@ -335,6 +417,9 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ## Info
     `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
     `reward_forward` and `reward_ctrl`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
@@ -353,16 +438,68 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Actions, observations, rewards and infos are equal to `Humanoid-v5`.
 
     ## Action space
-    `Box(-0.4, 0.4, (17,), float32)`: torques of the motors divided by their gears: 100 N·m for the
-    waist and the hips' x and z axes, 300 N·m for their y axes, 200 N·m for the knees, and 25 N·m
-    for the arms. An action lasts 0.015 s.
+    `Box(-0.4, 0.4, (17,), float32)`: torques of the motors divided by their gears: 300 N·m for the
+    hips' y axes, 200 N·m for the knees, 25 N·m for the arms and 100 N·m for all others. An action
+    lasts 0.015 s.
+
+    | Num | Action                  | Min  | Max | Unit |
+    | --- | ----------------------- | ---- | --- | ---- |
+    | 0   | `abdomen_y/motor`       | -0.4 | 0.4 | 1    |
+    | 1   | `abdomen_z/motor`       | -0.4 | 0.4 | 1    |
+    | 2   | `abdomen_x/motor`       | -0.4 | 0.4 | 1    |
+    | 3   | `right_hip_x/motor`     | -0.4 | 0.4 | 1    |
+    | 4   | `right_hip_z/motor`     | -0.4 | 0.4 | 1    |
+    | 5   | `right_hip_y/motor`     | -0.4 | 0.4 | 1    |
+    | 6   | `right_knee/motor`      | -0.4 | 0.4 | 1    |
+    | 7   | `left_hip_x/motor`      | -0.4 | 0.4 | 1    |
+    | 8   | `left_hip_z/motor`      | -0.4 | 0.4 | 1    |
+    | 9   | `left_hip_y/motor`      | -0.4 | 0.4 | 1    |
+    | 10  | `left_knee/motor`       | -0.4 | 0.4 | 1    |
+    | 11  | `right_shoulder1/motor` | -0.4 | 0.4 | 1    |
+    | 12  | `right_shoulder2/motor` | -0.4 | 0.4 | 1    |
+    | 13  | `right_elbow/motor`     | -0.4 | 0.4 | 1    |
+    | 14  | `left_shoulder1/motor`  | -0.4 | 0.4 | 1    |
+    | 15  | `left_shoulder2/motor`  | -0.4 | 0.4 | 1    |
+    | 16  | `left_elbow/motor`      | -0.4 | 0.4 | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (348,), float64)` for the unedited body: height, m, and orientation of the torso
-    as a quaternion; angles of the joints, rad; velocity, m/s, and angular velocity, rad/s, of the
-    torso; velocities of the joints, rad/s; inertia (kg·m², kg·m, kg) and twist (rad/s, m/s) of each
-    body; torques of the motors at the joints, N·m; and contact torque and force on each body, N·m
-    and N.
+    `Box(-inf, inf, (348,), float64)`, for the unedited body:
+
+    | Num     | Observation             | Min     | Max      | Unit            |
+    | ------- | ----------------------- | ------- | -------- | --------------- |
+    | 0       | `torso/z`               | -inf    | inf      | m               |
+    | 1       | `torso/qw`              | -1      | 1        | 1               |
+    | 2       | `torso/qx`              | -1      | 1        | 1               |
+    | 3       | `torso/qy`              | -1      | 1        | 1               |
+    | 4       | `torso/qz`              | -1      | 1        | 1               |
+    | 5       | `abdomen_z/angle`       | -0.7854 | 0.7854   | rad             |
+    | 6       | `abdomen_y/angle`       | -1.309  | 0.5236   | rad             |
+    | 7       | `abdomen_x/angle`       | -0.6109 | 0.6109   | rad             |
+    | 8       | `right_hip_x/angle`     | -0.4363 | 0.08727  | rad             |
+    | 9       | `right_hip_z/angle`     | -1.047  | 0.6109   | rad             |
+    | 10      | `right_hip_y/angle`     | -1.92   | 0.3491   | rad             |
+    | 11      | `right_knee/angle`      | -2.793  | -0.03491 | rad             |
+    | 12      | `left_hip_x/angle`      | -0.4363 | 0.08727  | rad             |
+    | 13      | `left_hip_z/angle`      | -1.047  | 0.6109   | rad             |
+    | 14      | `left_hip_y/angle`      | -1.92   | 0.3491   | rad             |
+    | 15      | `left_knee/angle`       | -2.793  | -0.03491 | rad             |
+    | 16      | `right_shoulder1/angle` | -1.484  | 1.047    | rad             |
+    | 17      | `right_shoulder2/angle` | -1.484  | 1.047    | rad             |
+    | 18      | `right_elbow/angle`     | -1.571  | 0.8727   | rad             |
+    | 19      | `left_shoulder1/angle`  | -1.047  | 1.484    | rad             |
+    | 20      | `left_shoulder2/angle`  | -1.047  | 1.484    | rad             |
+    | 21      | `left_elbow/angle`      | -1.571  | 0.8727   | rad             |
+    | 22      | `torso/vx`              | -inf    | inf      | m/s             |
+    | 23      | `torso/vy`              | -inf    | inf      | m/s             |
+    | 24      | `torso/vz`              | -inf    | inf      | m/s             |
+    | 25      | `torso/wx`              | -inf    | inf      | rad/s           |
+    | 26      | `torso/wy`              | -inf    | inf      | rad/s           |
+    | 27      | `torso/wz`              | -inf    | inf      | rad/s           |
+    | 28-44   | `*/velocity`            | -inf    | inf      | rad/s           |
+    | 45-174  | `*/inertia/*`           | -inf    | inf      | kg·m², kg·m, kg |
+    | 175-252 | `*/twist/*`             | -inf    | inf      | rad/s, m/s      |
+    | 253-269 | `*/drive`               | -inf    | inf      | N·m             |
+    | 270-347 | `*/contact/*`           | -inf    | inf      | N·m, N          |
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost - contact_cost`: 5 while healthy, plus 1.25 times
@@ -370,8 +507,10 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     sum(force^2)` of the contact forces and torques, which is at most 10.
 
     ## Start
-    The pose of `Runner`, with uniform noise of `reset_noise_scale` (0.01). The knees start at their
-    limit, bent by 2 degrees, whereas Gymnasium's start straight.
+    Gymnasium's pose, with joints beyond a limit moved to the limit, and the trunk high enough for
+    the feet, with uniform noise of `reset_noise_scale` (0.01). Joints stay inside their limits and
+    feet above the floor. The knees start at their limit, bent by 2 degrees, whereas Gymnasium's
+    start straight.
 
     ## End
     Terminated when the torso is below 1 m or above 2 m. For other bodies these heights scale with
@@ -381,6 +520,9 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
     `tendon_length`, m, and `tendon_velocity`, m/s; `reward_forward`, `reward_ctrl`,
     `reward_contact` and `reward_survive`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
