@@ -133,12 +133,13 @@ def _numbers(env: gym.Env[Any, Any]) -> str:
     """Return the tables of both spaces of an env whose docstring describes another body."""
     described = inspect.getdoc(type(env.unwrapped)) or ""
     observation, action = layouts_of(env)
+    last = layout_rows(observation, "Observation")[-1][0] if observation else ""
+    if "| Num" in described and (f"| {last} " in described or len(observation or ()) == 1):
+        return ""
     sections: list[str] = []
     for layout, title in ((observation, "Observation"), (action, "Action")):
         if layout is not None:
             rows = layout_rows(layout, title)
-            if "| Num" in described and (len(layout) == 1 or f"| {rows[-1][0]} " in described):
-                break
             sections += [f"## {title}s", table(("Num", title, "Min", "Max", "Unit"), rows)]
     return _page(*sections)
 

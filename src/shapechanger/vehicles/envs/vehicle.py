@@ -16,7 +16,7 @@ from shapechanger.errors import ProfileError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.vehicles.bodies import vehicle_model
 from shapechanger.vehicles.courses.course import FLOODED
-from shapechanger.vehicles.envs.drive import DriveEnv, Steering, simulated_robot, space_of
+from shapechanger.vehicles.envs.drive import Courses, DriveEnv, Steering, simulated_robot, space_of
 from shapechanger.vehicles.envs.ranges import RangesEnv, leave_rest, observe_ranges
 from shapechanger.vehicles.envs.sensed import SensedVehicle
 from shapechanger.vehicles.envs.shift import certify_vehicles
@@ -109,17 +109,25 @@ class VehicleEnv(DriveEnv):
         self,
         vehicle: str,
         *,
+        world: str | None = None,
         robot: str | os.PathLike[str] | None = None,
         steering: Steering | None = None,
         size: Sequence[int] | None = None,
         image: bool = True,
         state: bool = False,
         reward: Mapping[str, float] | None = None,
-        **task: Any,
+        courses: Courses = "training",
+        randomise: bool = False,
+        put_back: bool = False,
+        lenses: Sequence[str] = (),
+        render_mode: str | None = None,
     ) -> None:
         self.welcome = profile = simulated_robot(vehicle, robot, size, steering)
         weights = {**profile.reward, **(reward or {})}
-        super().__init__(profile, vehicle, weights, has_camera=image, **task)
+        super().__init__(
+            profile, vehicle, weights, has_camera=image, world=world, courses=courses,
+            randomise=randomise, put_back=put_back, lenses=lenses, render_mode=render_mode,
+        )  # fmt: skip
         self._period_ns = round(1e9 / profile.control_hz)
         self._has_image, self._has_state = image, state or not image
         self._state = profile.state_layout
