@@ -54,7 +54,7 @@ def quick(
 def test_a_study_is_one_command(
     quick: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
-    """A table, study.json, and a self-contained report."""
+    """A table, study.json, a self-contained report, and one plain line per completed run."""
     out, done = quick
     assert done.returncode == 0, done.stderr
     assert "Jumpstart" in done.stdout
@@ -65,15 +65,8 @@ def test_a_study_is_one_command(
     study = json.loads((out / "study.json").read_text())
     assert "InvertedPendulum" in study["command"]
     assert study["plan"]["versions"]["shapechanger"]
-
-
-def test_progress_is_plain_lines_without_a_terminal(
-    quick: tuple[Path, subprocess.CompletedProcess[str]],
-) -> None:
-    """One line per completed run, and no control characters."""
-    lines = quick[1].stderr.splitlines()
-    assert sum(" ended; " in line for line in lines) == 11
-    assert "\x1b" not in quick[1].stderr
+    assert sum(" ended; " in line for line in done.stderr.splitlines()) == 11
+    assert "\x1b" not in done.stderr
 
 
 def _until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:

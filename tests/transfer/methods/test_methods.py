@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import RobotError, StudyError, UnknownName
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.policy import load_policy
 from shapechanger.registry import METHODS
-from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.body_map import body_map
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import resolve_learner
@@ -178,16 +178,10 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_learned_actions_are_not_distilled() -> None:
-    source, target = ANT.make(), EXTENDED.make()
-    layouts = [
-        getattr(env.unwrapped, f"{side}_layout")
-        for side in ("observation", "action")
-        for env in (source, target)
-    ]
-    crossing = BodyMap.between(*layouts, rules={"foot_*/motor": "learn"})
+    crossing = body_map(ANT.make(), EXTENDED.make(), rules={"foot_*/motor": "learn"})
     teacher = MappedTeacher(lambda observations: np.ones((len(observations), 8)), crossing)
     assert teacher.taught.sum() == 8
-    shown = teacher(np.zeros((3, target.observation_space.shape[0])))  # pyright: ignore[reportOptionalSubscript]
+    shown = teacher(np.zeros((3, crossing.target_observation.size)))
     assert shown.shape == (3, 12)
     assert (shown[:, teacher.taught] == 1.0).all()
 
@@ -220,13 +214,7 @@ def test_a_network_without_a_trunk_is_refused() -> None:
 
 def test_a_shuffled_map_has_the_same_rules() -> None:
     """Rules are exchanged between entries of one shape; constants stay."""
-    source, target = ANT.make(), EXTENDED.make()
-    layouts = [
-        getattr(env.unwrapped, f"{side}_layout")
-        for side in ("observation", "action")
-        for env in (source, target)
-    ]
-    right = BodyMap.between(*layouts)
+    right = body_map(ANT.make(), EXTENDED.make())
     wrong = shuffle(right, np.random.default_rng(0))
     for side in ("observation", "action"):
         ours, theirs = getattr(wrong, side), getattr(right, side)
@@ -305,11 +293,9 @@ def test_transitions_are_those_of_the_env() -> None:
 
 
 def test_mapped_transitions_are_those_of_the_target() -> None:
-    bodies = [EnvRef(f"shapechanger/{name}-v1").make() for name in ("Ant", "ExtendedAnt")]
-    (seen, acts), (sees, does) = (layouts_of(body) for body in bodies)
-    for body in bodies:
-        body.close()
-    body_map = BodyMap.between(seen, sees, acts, does)
+    crossing = body_map(ANT.make(), EXTENDED.make())
+    seen, sees = crossing.source_observation, crossing.target_observation
+    acts, does = crossing.source_action, crossing.target_action
     rng = np.random.default_rng(0)
     ours = Transitions(
         rng.normal(size=(3, seen.size)),
@@ -318,7 +304,7 @@ def test_mapped_transitions_are_those_of_the_target() -> None:
         rng.normal(size=(3, seen.size)),
         np.zeros(3, bool),
     )
-    theirs = _mapped(ours, body_map)
+    theirs = _mapped(ours, crossing)
     assert theirs.observations.shape == (3, sees.size)
     assert theirs.actions.shape == (3, does.size)
     for name in set(seen.names) & set(sees.names):
@@ -328,7 +314,7 @@ def test_mapped_transitions_are_those_of_the_target() -> None:
 
 
 def test_off_dynamics_needs_equal_spaces_and_plain_observations() -> None:
-    ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
+    ants = TransferTask(ANT, EXTENDED)
     with pytest.raises(StudyError, match="the same spaces"):
         tiny_plan(short(), task=ants, arms=("scratch", "off-dynamics"))
     with pytest.raises(StudyError, match="normalise=false"):

@@ -315,10 +315,6 @@ def test_without_learning_there_are_no_scores() -> None:
     assert "1 show nothing" in words
 
 
-def same(level: float, seeds: int = 5) -> np.ndarray:
-    return np.full((seeds, 11), level)
-
-
 def test_drawings_are_reproducible(study: Study) -> None:
     """Equal studies give equal bytes, without a date."""
     drawing = learning_curves(study, "target")["target"]
