@@ -7,8 +7,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,22 +17,13 @@ from shapechanger.errors import FailedRuns, OutputError, StudyError, UnknownName
 from shapechanger.transfer.executor import Executor, Job, Processes, Serial
 from shapechanger.transfer.ray_executor import RayCluster
 from shapechanger.transfer.study import run_study
+from tests.robot.client.robot import eventually
 from tests.transfer import jobs
 from tests.transfer.studies import tiny_plan
 
 pytestmark = [pytest.mark.system, pytest.mark.filterwarnings("ignore::FutureWarning:ray")]
 
 EXECUTORS = [Serial(), Processes(2)]
-
-
-def await_(condition: object, timeout_s: float = 60.0) -> None:
-    """Wait until `condition()` is true, or fail."""
-    assert callable(condition)
-    end = time.monotonic() + timeout_s
-    never = threading.Event()
-    while not condition():
-        assert time.monotonic() < end, "waited too long"
-        never.wait(0.01)
 
 
 @pytest.mark.parametrize("executor", EXECUTORS, ids=["serial", "processes"])
@@ -128,11 +117,6 @@ def test_a_script_without_a_guarded_start_is_reported(tmp_path: Path) -> None:
     assert "sum (its process was lost 3 times, at last with exit code 1)" in last
 
 
-def test_no_workers_are_refused() -> None:
-    with pytest.raises(StudyError, match="at least one worker, got 0"):
-        Processes(0)
-
-
 def test_processes_end_with_their_parent(tmp_path: Path) -> None:
     pid_file = tmp_path / "pid"
     code = f"from tests.transfer import jobs; jobs.run_for_ever({str(pid_file)!r})"
@@ -142,12 +126,12 @@ def test_processes_end_with_their_parent(tmp_path: Path) -> None:
     script.write_text(main)
     parent = subprocess.Popen([sys.executable, str(script)], env=environment)
     try:
-        await_(lambda: pid_file.exists() and pid_file.read_text())
+        eventually(lambda: pid_file.exists() and bool(pid_file.read_text()), 60.0)
     finally:
         parent.send_signal(signal.SIGKILL)
         parent.wait()
     child = int(pid_file.read_text())
-    await_(lambda: not _alive(child))
+    eventually(lambda: not _alive(child), 60.0)
 
 
 def _alive(pid: int) -> bool:
