@@ -235,7 +235,7 @@ def test_a_full_disk_loses_nothing(
     assert curves(run_study(tiny_plan(), out, executor=Serial())) == curves(finished[0])
 
 
-def test_evaluations_are_not_more_frequent_than_updates(finished: tuple[Study, Path]) -> None:
+def test_evaluations_are_not_more_frequent_than_updates() -> None:
     with pytest.raises(StudyError, match="more often than an update"):
         msgspec.structs.replace(TINY, eval_every=31)
     with pytest.raises(StudyError, match="at least one env"):

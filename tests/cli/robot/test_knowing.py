@@ -64,11 +64,8 @@ def test_a_file_that_cannot_be_read_is_left_alone() -> None:
 _HALVES = {"█": (0, 0), "▀": (0, 1), "▄": (1, 0), " ": (1, 1)}
 
 
-def test_the_qr_code_holds_the_console_address(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_qr_code_holds_the_console_address(capsys: pytest.CaptureFixture[str]) -> None:
     """The key is in the fragment of the URL, which browsers do not send."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     made = make_credentials(credentials_folder("car"), "car")
     main(["robot", "key", "car", "--qr", "--address", "192.168.0.7"])
     output = capsys.readouterr().out
