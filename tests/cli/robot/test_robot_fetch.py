@@ -24,6 +24,7 @@ from shapechanger.errors import DemosError
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot, remember
 from shapechanger.robot.client.recordings import fetch_episode
+from tests.demos.exchange.small import snapshot
 from tests.robot.client.test_real_daemon import Served
 from tests.robot.daemon.plans import ACTIONS, picture
 
@@ -61,15 +62,6 @@ def record(folder: Path, count: int = 40) -> Path:
     return writer.path
 
 
-def files(folder: Path) -> dict[str, bytes]:
-    """Return all files below a folder, keyed by name."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-
-
 def test_fetching_copies_exactly_and_then_only_what_is_new(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -78,7 +70,7 @@ def test_fetching_copies_exactly_and_then_only_what_is_new(
     fetch = ["robot", "fetch", "car", "--out", str(data)]
     main(fetch)
     assert "40 steps kept of 40, 41 lines came" in capsys.readouterr().out
-    assert files(data / first.name) == files(first)
+    assert snapshot(data / first.name) == snapshot(first)
     edit(first, Drop(0, 9, "bad"))
     second = record(there, 3)
     main(fetch)
@@ -89,7 +81,7 @@ def test_fetching_copies_exactly_and_then_only_what_is_new(
     assert capsys.readouterr().out == f"{second.name}: 3 steps kept of 3, nothing new\n"
     assert [path.name for path in episodes_of(data)] == [first.name, second.name]
     for path in (first, second):
-        assert files(data / path.name) == files(path)
+        assert snapshot(data / path.name) == snapshot(path)
     assert len(read_episode(data / first.name).kept) == 30
 
 
@@ -115,10 +107,10 @@ def test_an_interrupted_fetch_resumes(there: Path, robot: RobotClient, tmp_path:
         with pytest.raises(DemosError, match="no episode"):
             episodes_of(data)
         fetch_episode(robot, episode.name, data)
-        came = files(data / episode.name)
+        came = snapshot(data / episode.name)
         if stray:
             del came[f"frames/{whole:06d}.jpg"]
-        assert came == files(episode)
+        assert came == snapshot(episode)
         assert not part.exists()
 
 
@@ -146,9 +138,9 @@ def test_edits_of_both_sides_survive(
     assert lines[: len(theirs)] == theirs
     assert Counter(mine) - Counter(lines) == Counter()
     assert len(read_episode(local).steps) == 12
-    before = files(local)
+    before = snapshot(local)
     assert fetch_episode(robot, episode.name, data)[0] == 0
-    assert files(local) == before
+    assert snapshot(local) == before
 
 
 def test_a_repair_here_stays(there: Path, robot: RobotClient, tmp_path: Path) -> None:
@@ -158,9 +150,9 @@ def test_a_repair_here_stays(there: Path, robot: RobotClient, tmp_path: Path) ->
     episode, data = path.parent, tmp_path / "here"
     fetch_episode(robot, episode.name, data)
     repair(data / episode.name)
-    before = files(data)
+    before = snapshot(data)
     fetch_episode(robot, episode.name, data)
-    assert files(data) == before
+    assert snapshot(data) == before
 
 
 def test_other_steps_are_not_overwritten(
@@ -172,7 +164,7 @@ def test_other_steps_are_not_overwritten(
     steps = first / "steps.jsonl"
     steps.write_bytes(b"".join(steps.read_bytes().splitlines(True)[:3]))
     second = record(there, 2)
-    before = files(data / first.name)
+    before = snapshot(data / first.name)
     with pytest.raises(SystemExit) as ended:
         main(["robot", "fetch", "car", "--out", str(data)])
     assert ended.value.code == 1
@@ -180,8 +172,8 @@ def test_other_steps_are_not_overwritten(
     assert "has other steps than" in output.err
     assert "`--out` with another folder" in output.err
     assert second.name in output.out
-    assert files(data / first.name) == before
-    assert files(data / second.name) == files(second)
+    assert snapshot(data / first.name) == before
+    assert snapshot(data / second.name) == snapshot(second)
 
 
 @pytest.mark.parametrize("damage", ["line", "picture", "missing"])
