@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -38,12 +37,4 @@ def tiny_plan(settings: PpoSettings = TINY, **arguments: Any) -> Plan:
 def curves(study: Study) -> dict[str, list[tuple[int, float]]]:
     return {
         result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
-    }
-
-
-def files_of(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
     }

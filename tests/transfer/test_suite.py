@@ -20,9 +20,10 @@ from shapechanger.transfer.executor import Executor, Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
 from shapechanger.transfer.suite import StudyOutcome, open_study_folder, study_outcome
+from tests.demos.exchange.small import snapshot
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 from tests.transfer.report.studies import make_study
-from tests.transfer.studies import curves, files_of
+from tests.transfer.studies import curves
 
 _KINDS = ("source", "random", "zero-action", "scratch", "zero-shot", "fine-tune")
 
@@ -101,8 +102,8 @@ def test_runs_of_a_source_are_shared(out: Path) -> None:
     there, here = out / "Dry-to-Wet", out / _study(plan)
     assert here == out / "Dry-to-Icy"
     for name in _names("source"):
-        taken_over = files_of(here / "runs" / name)
-        assert taken_over == files_of(there / "runs" / name)
+        taken_over = snapshot(here / "runs" / name)
+        assert taken_over == snapshot(there / "runs" / name)
         assert set(taken_over) == {"curve.jsonl", "policy.safetensors", "run.json"}
     shown = {path.name: path.read_bytes() for path in (here / "demonstrations").iterdir()}
     assert set(shown) == {"source-0.npz", "source-1.npz"}
@@ -117,7 +118,7 @@ def test_runs_of_a_target_are_shared(out: Path) -> None:
     assert set(executor.names) == _names("source", "zero-shot", "fine-tune")
     for name in _names("random", "zero-action", "scratch"):
         there, here = (out / study / "runs" / name for study in ("Dry-to-Wet", "Icy-to-Wet"))
-        assert files_of(here) == files_of(there)
+        assert snapshot(here) == snapshot(there)
     alone = run_study(plan, out.parent / "alone", executor=Serial())
     assert curves(parallel) == curves(alone)
     assert parallel.summaries == alone.summaries
@@ -165,7 +166,7 @@ def test_partial_copies_are_removed(out: Path, monkeypatch: pytest.MonkeyPatch) 
     assert not (runs / "source-0").exists()
     _requested(plan, out)
     assert sorted(path.name for path in runs.iterdir()) == ["source-0", "source-1"]
-    assert files_of(runs / "source-0") == files_of(out / "Dry-to-Wet" / "runs" / "source-0")
+    assert snapshot(runs / "source-0") == snapshot(out / "Dry-to-Wet" / "runs" / "source-0")
 
 
 _STEADY = np.linspace(0.0, 1000.0, 11)  # To 1,000 in 10,240 steps, an evaluation each 1,024.

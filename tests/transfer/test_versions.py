@@ -20,6 +20,7 @@ from shapechanger.transfer.runs import load_result, perform_run
 from shapechanger.transfer.study import Study, make_plan, run_study
 from shapechanger.transfer.suite import merge_study, open_study_folder
 from shapechanger.transfer.versions import require_planned
+from tests.demos.exchange.small import snapshot
 from tests.transfer.own_robot import (
     METHOD,
     TASK,
@@ -30,7 +31,7 @@ from tests.transfer.own_robot import (
     task_of,
     write_project,
 )
-from tests.transfer.studies import BIG, SMALL, files_of
+from tests.transfer.studies import BIG, SMALL
 
 
 @pytest.fixture(scope="module")
@@ -94,11 +95,11 @@ def test_an_edited_file_does_not_join_older_runs(edit: str, seeds: int, copied: 
     """Resuming and growing are refused, name the change and the way out, and change nothing."""
     file, content, text = _EDITS[edit]
     (copied / file).write_text(content)
-    before = files_of(copied / "study")
+    before = snapshot(copied / "study")
     plan = plan_of("shared", seeds)
     with pytest.raises(ForeignStudy, match=f"{text}.*give another --out, or delete"):
         study_of(plan, Path("study"))
-    assert files_of(copied / "study") == before
+    assert snapshot(copied / "study") == before
 
 
 _LOOKS = {
@@ -153,10 +154,10 @@ def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
     plan = plan_of("shared")
     (copied / "b.xml").write_text(XML.format(0.5))
     run = Run("scratch", 0)
-    before = files_of(copied / "study")
+    before = snapshot(copied / "study")
     with pytest.raises(ForeignStudy, match=r"b\.xml.*: its model has changed from \w+ to \w+"):
         perform_run(plan, run, "study", None, lambda steps: None)
-    assert files_of(copied / "study") == before
+    assert snapshot(copied / "study") == before
     require_planned(plan, Run("source", 0))  # The source's has not changed.
     with pytest.raises(ForeignStudy, match="What this study was planned with has changed"):
         study_of(plan, Path("new"))
@@ -299,10 +300,10 @@ def test_a_study_runs_with_a_learner_and_a_method_of_others(
     arms = ("scratch", "zero-shot", "fine-tune", "patient")
     study = _study(tmp_path / "study", arms)
     assert [e.steps for e in study.of("patient")[0].curve] == [0, 2, 4]
-    before = files_of(tmp_path / "study")
+    before = snapshot(tmp_path / "study")
     again = _study(tmp_path / "study", arms)
     assert (again.runs, again.plan) == (study.runs, study.plan)
-    assert files_of(tmp_path / "study") == before
+    assert snapshot(tmp_path / "study") == before
     assert "a_learner.py" in study.plan.identity["learner"].files
 
 
