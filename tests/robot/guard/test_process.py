@@ -412,7 +412,7 @@ def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(make: _Make) -> 
     bench = make(sensors={"bumper": sensor})
     bench.arms()
     bench.run(100)
-    fails = "Sensor bumper fails, and can protect no longer: "
+    fails = "Sensor bumper fails and cannot protect the robot: "
     assert bench.reasons() == [
         *("Not armed.", "", "Not forward: the bumper touched something."),
         *(f"{fails}No answer.", f"{fails}It returned a value that is not finite."),
@@ -453,7 +453,7 @@ def test_no_stop_waits_for_a_sensor(make: _Make, takes_ms: int) -> None:
 def test_a_sensor_that_is_slow_stops_the_robot(make: _Make) -> None:
     bench, _ = _slow(make, lambda ms: 0 if ms < 45 else 21 if ms < 150 else 20)
     bench.run(200)
-    text = "Sensor wheel holds up the robot: It took more than 20 ms to answer."
+    text = "Sensor wheel delays the robot: It took more than 20 ms to answer."
     slow = [state for state in bench.states if state.stop_reason == text]
     assert slow[0].at_ns == _T0 + 71 * MS
     assert all(state.outputs["drive"] == 0.0 for state in slow)

@@ -405,12 +405,12 @@ def test_a_low_battery_stops_until_it_is_full_and_armed_again() -> None:
 def test_a_failed_protective_sensor_stops(name: str, limits: LimitPlan, stops: bool) -> None:
     """A slow sensor stops whatever it measures, because it delays every stop."""
     robot = _driving(quick_car(limits))
-    text = f"Sensor {name} fails, and can protect no longer: No answer."
+    text = f"Sensor {name} fails and cannot protect the robot: No answer."
     robot.rules.sense(Sensing(failures={name: "No answer."}), _T0)
     decision = robot.tick()
     assert (decision.seq, decision.stop_reason) == ((None, text) if stops else (1, ""))
     robot.rules.sense(Sensing(failures={name: "Slow."}, slow={name}), _T0)
-    assert robot.tick().stop_reason == f"Sensor {name} holds up the robot: Slow."
+    assert robot.tick().stop_reason == f"Sensor {name} delays the robot: Slow."
     robot.rules.sense(Sensing(), _T0)
     assert robot.tick().seq == 1
 

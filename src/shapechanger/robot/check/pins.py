@@ -60,7 +60,7 @@ def _require_free_pin(pin: int, plan: GuardPlan) -> None:
 
 
 def probed_pin(plan: GuardPlan, probe: int) -> int:
-    """Return the BCM pin that a probe has to be joined to, at the motor that drives forward."""
+    """Return the BCM pin to connect a probe to: the one that drives a motor forward."""
     _require_free_pin(probe, plan)
     for output in plan.outputs:
         weight = output.mix.get("throttle", 0.0)
@@ -95,13 +95,13 @@ def check_jumper(output: int, sensed: int, plan: GuardPlan) -> str:
 
 
 def outside_level(pin: int, hardware: Hardware) -> int | None:
-    """Return the level of a pin with external resistors; None if the Pi's own one determines it."""
+    """Return the level that an external resistor gives a pin; None without such a resistor."""
     up, down = (pin_level(pin, hardware, pull_up=pull_up) for pull_up in (True, False))
     return up if up == down else None
 
 
 def pin_level(pin: int, hardware: Hardware, *, pull_up: bool) -> int:
-    """Return the level of a pin with the Pi's own resistor; it floats again afterwards."""
+    """Return the level of a pin with the Pi's own resistor; the pin floats again afterwards."""
     from gpiozero import InputDevice  # Robots without pins do not need gpiozero.
 
     with (
@@ -121,11 +121,11 @@ Ask = Callable[[str], bool | None]
 class BenchLamp(NamedTuple):
     """An LED instead of a motor or servo."""
 
-    name: str  # Its output and direction, such as "drive forward".
-    place: str  # Its pin or channel, such as "GPIO22".
+    name: str  # Output and direction, such as "drive forward".
+    place: str  # Pin or channel, such as "GPIO22".
     output: OutputPlan | None  # None for the enable line.
     value: float  # Value of the output at which it is lit.
-    pin: int | None  # Its BCM pin; None on a PWM chip.
+    pin: int | None  # BCM pin; None on a PWM chip.
 
 
 def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
@@ -139,7 +139,7 @@ def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
         elif not lights:
             raise RobotError(
                 f"Output {name} is a servo on a bus ({output.driver}), which LEDs cannot "
-                "replace: take a robot whose outputs are on pins, such as `init car`."
+                "replace: use a robot whose outputs are on pins, such as `init car`."
             )
         else:
             pins = [(settings[key], name + end, value) for key, end, value in lights]
@@ -159,7 +159,8 @@ def check_lamps(
     """Light each LED alone, and ask or measure whether it is lit.
 
     `connect_pins` opens the pins and buses, which no other program may use meanwhile. `sees`
-    measures whether an LED is lit; None if it cannot. Without an answer, it is lit for `shown_s`.
+    measures whether an LED is lit, and returns None if it cannot. If `ask` returns None, the LED
+    is lit for `shown_s` seconds.
     """
     for lamp in lamps_of(plan):
         check = f"LED {lamp.place}"

@@ -47,15 +47,15 @@ class Finding(NamedTuple):
 
 
 def judged(good: bool, sentence: str, otherwise: str = "") -> Result:
-    """Return a good result, or a bad one with another sentence if there is one."""
+    """Return a good result, or a bad one with the sentence `otherwise` if it is not empty."""
     return ("good", sentence) if good else ("bad", otherwise or sentence)
 
 
 def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding]:
     """Yield the findings of checks.
 
-    After an error of any kind, or after `limit_s` seconds, the next one begins. None is for checks
-    that depend on the previous ones.
+    With a limit, the next check begins after any error or after `limit_s` seconds. Without a limit,
+    an error ends all checks, because a check may depend on the previous ones.
     """
     for name, results in checks:
         limited = results if limit_s is None else _finish_in_time(results, limit_s)

@@ -58,10 +58,10 @@ class StandingRobot:
     port: int = 0  # Port of its server.
     root: Path = Path("/")  # Root of the file system.
     hardware: Callable[[], Hardware] = Hardware  # Opens its pins and buses.
-    motors_off: bool = False  # The motors have no supply, so that resistors can be tested.
-    installed: bool = True  # On its computer; False for a bench with LEDs.
+    motors_off: bool = False  # Whether the motors' supply is off, so resistors can be tested.
+    installed: bool = True  # Whether this is the robot's computer; False for a bench with LEDs.
     on_twin: bool = False  # A twin's computer has all pins and buses but no settings.
-    credentials: Path | None = None  # Folder of key and certificate; None for that of `init`.
+    credentials: Path | None = None  # Folder of key and certificate; None for `init`'s folder.
 
     @cached_property
     def pins(self) -> Hardware:
@@ -70,7 +70,7 @@ class StandingRobot:
 
     @cached_property
     def port_error(self) -> str:
-        """Why its port cannot be used; "" if it can."""
+        """Why the robot's port cannot be used; "" if it can."""
         try:
             socket.create_server(("", self.port)).close()
         except OSError as error:
@@ -79,7 +79,7 @@ class StandingRobot:
 
     @property
     def has_pins(self) -> bool:
-        """Whether its computer has pins."""
+        """Whether the robot's computer has pins."""
         return self.on_twin or any((self.root / "dev").glob("gpiochip*"))
 
     def has_bus(self, bus: int) -> bool:
@@ -90,7 +90,7 @@ class StandingRobot:
 def examine(robot: StandingRobot) -> Iterator[Finding]:
     """Check all requirements of a robot's safety and function, without moving it.
 
-    A check that fails or hangs is a finding, and the others go on.
+    A check that fails or hangs yields a finding, and the next check begins.
     """
     return run_checks(_checks(robot), CHECK_S)
 
@@ -100,7 +100,7 @@ def _checks(robot: StandingRobot) -> Checks:
         if robot.installed:
             yield from _installation(robot)
         yield from _computer(robot)
-    # The guard of a served robot has its pins and buses.
+    # While a robot is served, its guard uses the pins and buses.
     if not robot.port_error and importlib.util.find_spec("gpiozero") is not None:
         yield from _wiring(robot)
     yield "wiring", _close(robot)
@@ -156,7 +156,7 @@ def _wiring(robot: StandingRobot) -> Checks:
         or (robot.has_bus(plan.settings["bus"]) if "bus" in plan.settings else robot.has_pins)
     ]
     for plan in sensors:
-        if plan.driver not in {"as5600", DRIVER}:  # The servos are checked themselves.
+        if plan.driver not in {"as5600", DRIVER}:  # Encoders and servos have other checks.
             yield "sensor", _sensor(robot, plan)
     if any(output.driver == DRIVER for output in profile.outputs):
         yield "servo bus", _servo_bus(robot)
@@ -342,7 +342,7 @@ def _servo_board(robot: StandingRobot, bus: int, address: int) -> Results:
 
 
 def _servo_bus(robot: StandingRobot) -> Results:
-    """Check that every servo of the bus answers and is the right one, without torque."""
+    """Check that every servo of the bus answers and has the model of the profile; no torque."""
     servos = tuple(output for output in robot.profile.outputs if output.driver == DRIVER)
     if not all(map(stops_itself, servos)):
         yield "unknown", "Not tested: these servos have power only while the enable line is on."

@@ -33,7 +33,7 @@ from shapechanger.robot.link.messages import ClientMessage, Hello, RobotMessage,
 _Answer = TypeVar("_Answer", bound=RobotMessage)
 
 _MARGIN_S: Final = 2.0  # Time of a call in addition to the link's time limit, s.
-# Shares of the silence timeout: when to send a ping, and how often to check.
+# Fractions of the silence timeout: when to send a ping, and how often to check.
 _PING_AFTER: Final = 0.4
 _CHECK_EVERY: Final = 0.1
 _DISK_S: Final = 30.0  # Time that a robot may take to read its disk, s.
@@ -92,7 +92,7 @@ class RobotClient(Inbox):
             role: Whether a person or a program drives.
             name: Display name of the client; user and host by default.
             pace: Whether the clocks or the client set the pace.
-            frames: Whether observations carry frames.
+            frames: Whether observations contain frames.
             timeout_s: Time limit of the handshake, and of silence before the link is lost, s.
 
         Raises:
@@ -161,7 +161,7 @@ class RobotClient(Inbox):
         Args:
             values: One number for each action of the robot, in the order of its action layout.
             answers: `seq` of the observation that the command answers.
-            scale: Cap, 0 to 1, by which the values are multiplied.
+            scale: Factor of the values, 0 to 1, by which the client limits its commands.
 
         Returns:
             The number of the command.
@@ -210,7 +210,7 @@ class RobotClient(Inbox):
         return self.observation(seen.message.seq)
 
     def emergency_stop(self, reason: str = "") -> None:
-        """Stop all outputs, without control too, until a person arms the robot again."""
+        """Stop all outputs until a person arms the robot again; this needs no control."""
         self._post(messages.EmergencyStop(reason=reason))
 
     def disarm(self) -> None:
@@ -272,7 +272,7 @@ class RobotClient(Inbox):
         Args:
             episode: Id of the episode.
             first: Number of the first line, from 0.
-            count: Most lines to read; fewer are sent where the message would be too large.
+            count: Most lines to read; fewer are sent if the message would be too large.
         """
         request = messages.Fetch(episode=episode, first=first, count=count)
         return self._ask(request, messages.Piece)
@@ -311,11 +311,11 @@ class RobotClient(Inbox):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    # In the callers' threads.
+    # The methods from here on run in the callers' threads.
 
     def _call(self, function: Callable[..., object], *arguments: object) -> None:
-        """Call a function in the connection's thread, unless that has ended."""
-        if self._loop is None:  # It has not begun.
+        """Call a function in the connection's thread, unless the thread has ended."""
+        if self._loop is None:  # The thread has not begun.
             function(*arguments)
             return
         with contextlib.suppress(RuntimeError):
@@ -340,7 +340,7 @@ class RobotClient(Inbox):
             self._post(message)
             return self.answer(kind, heard, accepts, None if is_prompt else _DISK_S)
 
-    # In the connection's thread.
+    # The methods from here on run in the connection's thread.
 
     def _enqueue(self, message: ClientMessage) -> None:
         """Queue a message, replacing a waiting message of the same type.

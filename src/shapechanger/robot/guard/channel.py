@@ -17,8 +17,8 @@ import msgspec
 MAX_DATAGRAM: Final = 16 * 1024
 """Size of the largest datagram, bytes."""
 
-# Between two rounds, a daemon can send only as much as its socket holds. This also limits a round
-# if it sends as fast as it is read.
+# Limits a round while the daemon sends as fast as the guard reads. Between rounds, the socket's
+# buffer is the limit.
 _MOST_ORDERS_A_ROUND: Final = 1024
 
 
@@ -29,16 +29,16 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         kind: "command" moves; "halt" cancels the newest command and leaves the robot armed; "arm"
             enables motion, and ends an emergency stop; "disarm" blocks motion; "emergency" stops
             the robot until it is armed again; "end" ends the guard.
-        session: Number of the lease that it belongs to; commands of an older one are refused.
-        seq: Number of a command; each is larger than the one before in its session.
-        issued_ns: When the daemon received it. Needed for "command" and "arm", which are refused
-            when they are old.
-        ttl_ms: How long a command acts at most, counted from `issued_ns`.
-        frame_ns: When the newest image was taken; None without a camera or an image.
-        values: One finite number for each action; JSON has no others.
-        emergency: For "arm": number of emergency stops that the sender has seen; a newer one stays
+        session: Number of the sender's lease of control; commands of an older lease are refused.
+        seq: Sequence number of a command, which increases within a session.
+        issued_ns: Time at which the daemon received the request, ns. Required for "command" and
+            "arm", which are refused if they are old.
+        ttl_ms: Longest time for which a command acts, counted from `issued_ns`, ms.
+        frame_ns: Time of the newest image, ns; None without a camera or an image.
+        values: One finite number for each action.
+        emergency: For "arm": number of emergency stops that the sender has seen; a newer stop stays
             in force.
-        reason: For "disarm" and "emergency": the reason, for people to read.
+        reason: For "disarm" and "emergency": the reason, shown to people.
         person: For "arm": whether a person arms; only persons end an emergency stop.
     """
 
@@ -61,20 +61,20 @@ class GuardState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         at_ns: Time of the report, ns.
         armed: Whether commands move anything.
         emergency: Whether an emergency stop is in force.
-        emergencies: How many there were since the guard started; see `Order.emergency`.
+        emergencies: Number of emergency stops since the guard started; see `Order.emergency`.
         stop_reason: Why the command is not applied; empty if it is.
         applied: Applied value of each action.
-        applied_session: Session of the underlying command.
-        applied_seq: Its sequence number; None while the robot is at rest without a command.
-        applied_ns: When it reached the outputs.
-        refused: Why the newest command was refused; empty if none was refused since the last state.
-        refused_seq: Its number.
+        applied_session: `Order.session` of the applied command.
+        applied_seq: Sequence number of the applied command; None while the robot is at rest.
+        applied_ns: Time at which the applied command reached the outputs, ns; None at rest.
+        refused: Why the newest order was refused; empty if none was refused since the last state.
+        refused_seq: Sequence number of the refused command; None for other orders.
         outputs: Value of each output, -1 to 1.
         quantities: Sensor readings in SI units, keyed by name: "speed" m/s signed, "distance" m,
             "bump" 0 or 1, "battery" V, "yaw_rate" rad/s, "acceleration_x" m/s2, "temperature" C,
             "stall" 0 or 1, "collision" 0 or 1; without quantities that are not measured.
-        sources: Where a quantity comes from: name of a sensor, or "estimated".
-        bumps: How many bumps there were since the guard started.
+        sources: Source of each quantity: name of a sensor, or "estimated".
+        bumps: Number of bumps since the guard started.
     """
 
     at_ns: int
@@ -150,18 +150,18 @@ class _Socket:
 
 
 class DaemonChannel(_Socket):
-    """Channel over the daemon's socket."""
+    """The guard's end of the channel to the daemon."""
 
     def __init__(self, fd: int) -> None:
         super().__init__(fd)
         self._life: list[int] = []
 
     def filenos(self) -> list[int]:
-        """Return the socket and the lifeline, which closes when the daemon dies."""
+        """Return the descriptors of the socket and of the lifeline."""
         return [self._socket.fileno(), *self._life]
 
     def orders(self) -> tuple[list[Order], list[str]]:
-        """Return the orders that have arrived, and a reason for each datagram that is not one."""
+        """Return the orders that have arrived, and why each other datagram is invalid."""
         self._look()
         orders: list[Order] = []
         malformed: list[str] = []
@@ -192,8 +192,8 @@ class DaemonChannel(_Socket):
         return self._send(encode(state))
 
     def _watch(self, fd: int) -> None:
-        """Adopt the lifeline, whose end closes when the daemon dies; it carries no data."""
-        if self._life:  # The first is kept; the daemon sends one.
+        """Adopt the lifeline: a pipe without data whose other end closes when the daemon dies."""
+        if self._life:  # The daemon sends only one lifeline.
             os.close(fd)
             return
         self._life = [fd]
@@ -231,7 +231,7 @@ class Heartbeat(_Socket):
     def leave(self) -> int:
         """Stop beating, but keep the socket open until the process exits; return its descriptor.
 
-        The supervisor treats the end of the stream as the death of the process. If it were closed
-        too early, the supervisor would kill a process that is about to exit by itself.
+        The supervisor treats the end of the stream as the death of the process. If the socket were
+        closed too early, the supervisor would kill a process that is about to exit by itself.
         """
         return self._socket.detach()

@@ -14,13 +14,13 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, OutputDriver
 from shapechanger.robot.hardware import REAL, Hardware, load
 
-if TYPE_CHECKING:  # Most robots have none.
+if TYPE_CHECKING:  # Most robots have no servo bus.
     from shapechanger.robot.drivers.servos.bus import ServoBus
 
 
 def enable_device(pin: int, hardware: Hardware) -> Any:
-    """Open the pin that triggers the one-shot, low."""
-    from gpiozero import OutputDevice  # Robots without such pins do not need gpiozero.
+    """Open the pin that triggers the one-shot, at low level."""
+    from gpiozero import OutputDevice  # Only robots with pins need gpiozero.
 
     return OutputDevice(pin, initial_value=False, pin_factory=hardware.pin_factory())
 
@@ -38,7 +38,7 @@ class Switches:
         if plan.stop_pin is not None:
             from gpiozero import InputDevice
 
-            # Closes to ground; a cut wire is not detected.
+            # The button closes to ground, so a cut wire is not detected.
             factory = hardware.pin_factory()
             self._button = InputDevice(plan.stop_pin, pull_up=True, pin_factory=factory)
         pin = plan.enable_pin
@@ -63,8 +63,8 @@ class Switches:
                 device.close()
 
 
-# Pulses and duties have steps: at 50 Hz, a step of a PCA9685 is 1 % of a servo's range, and 5 % of
-# the range of a controller whose profile uses a fifth of it.
+# Smaller deviations are ignored, because pulses are quantised: at 50 Hz, a step of a PCA9685 is 1 %
+# of a servo's range, and 5 % for a motor controller whose profile uses a fifth of that range.
 _STEP: Final = 0.06
 
 
@@ -73,11 +73,11 @@ def estimated(
 ) -> tuple[tuple[float, ...], str]:
     """Estimate the applied actions of a robot from the values that its outputs have.
 
-    If outputs of an action deviate, its value is the one farthest from rest, among the outputs that
-    only this action moves.
+    If an output of an action deviates, the action is computed from each output that only this
+    action moves, and the value farthest from rest is returned.
 
     Returns:
-        One number for each action; and which outputs differ from the decision and why, "" if none.
+        One number for each action; and a text that explains each deviation, "" without any.
     """
     pairs = zip(plan.outputs, requested, has, strict=True)
     deviating = [output for output, wanted, value in pairs if abs(wanted - value) > _STEP]
@@ -140,7 +140,7 @@ class OutputBank:
         """Write all outputs, including unchanged ones: some controllers need several writes.
 
         Returns:
-            The applied actions, and which outputs differ; see `estimated`.
+            The applied actions, and a text that explains each deviation; see `estimated`.
         """
         values = output_values(self._plan, actions)
         for (output, driver), value in zip(self._drivers, values, strict=True):
@@ -160,7 +160,7 @@ class OutputBank:
         return ""
 
     def release(self) -> None:
-        """Release all outputs, once."""
+        """Release all outputs, unless they are released already."""
         if self.released:
             return
         for output, driver in self._drivers:

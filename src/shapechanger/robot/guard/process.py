@@ -2,7 +2,7 @@
 
 The daemon requests, `shapechanger.robot.guard.rules.Rules` decides, and this loop writes. It ends,
 with all outputs at rest, on SIGTERM, on the order "end", when the supervisor dies, and on any
-internal error. The death of the daemon disarms it.
+internal error. The death of the daemon disarms the robot.
 
 Exit codes: 0 if it was asked to end or the supervisor died, 1 after an error.
 """
@@ -37,7 +37,7 @@ from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.hardware import Hardware, connect
 
 _BEAT_S: Final = 0.01
-"""Interval between heartbeats, s of real time; the supervisor allows `guard_silence_ms`."""
+"""Interval between heartbeats, s of real time; after `guard_silence_ms` the guard is killed."""
 
 _WAIT_S: Final = 0.01  # Longest wait in real time while a twin's clock is paused, s.
 _STATE_EVERY_NS: Final = 20_000_000  # At least 50 states per second.
@@ -69,7 +69,7 @@ class Guard:
             undo.callback(self._switches.close)
             self._sensors = Sensors(plan, hardware)
             undo.callback(self._sensors.close)
-            # First at the end, because closing the pins takes time.
+            # Called first on closing, because closing the pins takes time.
             undo.callback(self._rest_outputs)
             self._opened = undo.pop_all()
         self._rules = Rules(plan, now_ns)
@@ -86,9 +86,9 @@ class Guard:
         self._sent: GuardState | None = None
         self._logged = ""
         self.is_safe = True
-        """Return whether all outputs obeyed on closing."""
+        """Whether all outputs were at rest on closing."""
         self.ended = ""
-        """Reason for ending; empty while it runs."""
+        """Reason for ending; empty while the guard runs."""
 
     def run(self, heartbeat: Heartbeat) -> None:
         """Run until asked to end, with a heartbeat to the supervisor."""
@@ -145,7 +145,7 @@ class Guard:
             self._switches.toggle()
 
     def _stay_alive(self) -> None:
-        """Feed the enable line and the supervisor within a round that takes long."""
+        """Feed the enable line and send a heartbeat during a long round."""
         self._feed()
         if self._heartbeat is not None:
             self._heartbeat.beat()
@@ -161,7 +161,7 @@ class Guard:
             if order.kind == "end":
                 self.ended = "the daemon ended it"
         if malformed:
-            self._rules.halt()  # Its sender has superseded the previous command.
+            self._rules.halt()  # The malformed order may have replaced the previous command.
             self._malformed += len(malformed)
             self._refused = (malformed[-1], None)
             text = shortened(malformed[-1])
@@ -190,7 +190,7 @@ class Guard:
                 actions, text = self._outputs.write(decision.actions, now_ns)
                 self._rules.learn(actions)
                 reason = decision.stop_reason
-                if decision.seq is not None:  # A robot at rest obeys, if slightly later.
+                if decision.seq is not None:  # At rest, a deviating output is only late.
                     reason = f"{reason} {text}".strip()
                 decision = replace(decision, actions=actions, stop_reason=reason)
         except Exception as error:  # After any error of a driver, the other outputs must rest.
@@ -239,7 +239,7 @@ class Guard:
             self._log.info("%s", fact)
             self._logged = fact
         sent = self._sent
-        # Some outputs need the first attempts sooner than the next tick.
+        # Sent on any change, and otherwise before the next tick would be too late.
         is_news = (
             sent is None
             or now_ns + self._period_ns - sent.at_ns > _STATE_EVERY_NS
@@ -253,8 +253,8 @@ class Guard:
 def main(arguments: Sequence[str]) -> None:
     """Run the guard.
 
-    The arguments are `--plan-fd N --daemon-fd N --heartbeat-fd N`, and before them
-    `--after-failure` if processes of this robot failed before it.
+    The arguments are `--plan-fd N --daemon-fd N --heartbeat-fd N`, preceded by `--after-failure` if
+    earlier processes of this robot failed.
     """
     log = log_to_stderr("guard")
     try:
@@ -269,7 +269,7 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
     names = ("--plan-fd", "--daemon-fd", "--heartbeat-fd")
     fds = descriptors(arguments[1:] if after_failure else arguments, names)
     ends = {signal.SIGTERM, signal.SIGINT}
-    signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # Until there is a guard to end.
+    signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # Signals wait until the guard exists.
     with contextlib.ExitStack() as opened:
         daemon = DaemonChannel(fds["--daemon-fd"])
         opened.callback(daemon.close)

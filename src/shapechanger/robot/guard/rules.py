@@ -74,10 +74,10 @@ class RobotHealth:
         """Update with new sensor readings."""
         failing: list[str] = []
         for name, why in sensing.failures.items():
-            if name in sensing.slow:  # A slow sensor delays every stop, even without a reflex.
-                failing.append(f"Sensor {name} holds up the robot: {why}")
+            if name in sensing.slow:  # A slow sensor delays every stop, even if no reflex uses it.
+                failing.append(f"Sensor {name} delays the robot: {why}")
             elif name in self._protecting:
-                failing.append(f"Sensor {name} fails, and can protect no longer: {why}")
+                failing.append(f"Sensor {name} fails and cannot protect the robot: {why}")
         low_v, high_c = self._limits.low_battery_v, self._limits.high_temperature_c
         volts = sensing.quantities.get("battery", math.inf)
         self._is_low = self._low.holds(low_v > 0.0 and volts < low_v, now_ns)
@@ -142,10 +142,10 @@ class OutputDecision:
 
     Attributes:
         actions: One number for each action.
-        release: Whether the outputs are released instead.
+        release: Whether the outputs are released instead of written.
         stop_reason: Why the robot does not follow its command; empty when it does.
-        session: Session of the underlying command.
-        seq: Its sequence number; None while the robot is at rest without a command.
+        session: Session of the command that the robot follows.
+        seq: Sequence number of that command; None while the robot is at rest.
     """
 
     actions: tuple[float, ...]
@@ -261,8 +261,8 @@ class Rules:
         push = self._reflexes.propulsion.push(self._done)
         self._reflexes.sense(sensing.quantities, bool(sensing.silent), push, now_ns)
         self._health.sense(sensing, now_ns)
-        # Faulty servos have released, and an intermittent magnet is loose: a person has to inspect
-        # them and arm again.
+        # A person has to inspect the robot and arm it again: faulty servos have released their
+        # joints, and an encoder that responds intermittently has a loose magnet.
         for name in self._disarming:
             if name in sensing.failures and name not in sensing.slow and self.armed:
                 self.disarm(sensing.failures[name])
@@ -290,7 +290,7 @@ class Rules:
         return decision
 
     def stands(self, now_ns: int) -> bool:
-        """Return whether `tick` would let no command act now."""
+        """Return whether `tick` would keep the robot at rest now."""
         return self._reason(now_ns) != ""
 
     def learn(self, done: tuple[float, ...]) -> None:
@@ -360,7 +360,7 @@ class Rules:
         """Return why the newest command must not act, or an empty string."""
         if reason := self.disarmed or self._health.reason:
             return reason
-        # Commands carry the time of the newest frame, so without a command its age is unknown.
+        # The age of the newest frame is known only from a command, which contains the frame's time.
         if self._command is None or now_ns >= self._expiry_ns:
             return "No fresh command."
         if not self._stale_ns:

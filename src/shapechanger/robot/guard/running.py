@@ -41,9 +41,9 @@ class ServePlan:
             `shapechanger.robot.hardware.connect`.
         python: The interpreter that runs the processes.
         patience_ms: Lower bound on the silence after which guard and daemon are killed, ms; their
-            own limits apply if those are longer. 0 on a robot, and on a twin in real time, whose
+            own limits apply if they are longer. 0 on a robot, and on a twin in real time, whose
             guard sends heartbeats while its board is delayed. The clock of other twins is paused
-            while the machine is busy or a world is drawn, and a guard that waits for it is alive.
+            while the machine is busy or renders, and a guard that waits for the clock is alive.
     """
 
     guard: GuardPlan
@@ -71,11 +71,11 @@ def plan_fd(plan: ServePlan) -> int:
     """
     # Without MFD_CLOEXEC, so that `exec` keeps it open.
     fd = os.memfd_create("serve-plan", os.MFD_ALLOW_SEALING)
-    # Not by msgspec, which encodes neither infinities nor pins, a subclass of int.
+    # msgspec encodes neither infinities nor pins, which are a subclass of int.
     left = memoryview(json.dumps(asdict(plan)).encode())
     while left:
         left = left[os.write(fd, left) :]
-    # The guard reads its limits from it, which a faulty daemon must not change.
+    # The guard reads its limits from this file, so a faulty daemon must not change it.
     seals = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL
     fcntl.fcntl(fd, fcntl.F_ADD_SEALS, seals)
     return fd
@@ -90,7 +90,7 @@ def command_of(program: Literal["supervise", "guard", "daemon"], plan: ServePlan
 
 
 def read_plan_fd(fd: int) -> ServePlan:
-    """Read the plan without moving the file position, so that several processes can."""
+    """Read the plan without moving the file position, which several processes share."""
     data = b""
     while part := os.pread(fd, 1 << 16, len(data)):
         data += part
@@ -98,7 +98,7 @@ def read_plan_fd(fd: int) -> ServePlan:
 
 
 AFTER_FAILURE: Final = "--after-failure"
-"""Argument of a guard that replaces failed processes."""
+"""Argument of a guard that is started after a failure."""
 
 
 def descriptors(arguments: Sequence[str], names: Sequence[str]) -> dict[str, int]:
@@ -148,9 +148,9 @@ class _Lines(logging.Handler):
 
 
 def log_to_stderr(program: str, name: str | None = None) -> logging.Logger:
-    """Return the log of `name`, or else of the program; the name begins each line."""
+    """Return the logger `name`, or the program's; each line begins with the program's name."""
     logging.raiseExceptions = False  # An unprintable message must not stop the guard.
-    # Without standard error, its number may belong to any file.
+    # If standard error is closed, descriptor 2 may belong to any file.
     handler = logging.NullHandler() if sys.__stderr__ is None else _Lines(_STDERR)
     handler.setFormatter(logging.Formatter(f"{program}: %(message)s"))
     log = logging.getLogger(f"shapechanger.robot.{program}" if name is None else name)
@@ -161,7 +161,7 @@ def log_to_stderr(program: str, name: str | None = None) -> logging.Logger:
 
 
 def shortened(text: str, most_bytes: int = 200) -> str:
-    """Return the longest prefix of a text that fits."""
+    """Return a text, cut after `most_bytes` and followed by "..." if it is longer."""
     data = text.encode(errors="replace")
     if len(data) <= most_bytes:
         return data.decode()
@@ -176,14 +176,14 @@ SUPERVISOR: Final = 10
 
 _NICENESS: Final = -10
 # Longest uninterrupted run of a real-time process, µs; the kernel then ends it (SIGXCPU) and the
-# supervisor restarts it. A round of the guard takes a few thousand.
+# supervisor restarts it. A round of the guard takes a few thousand µs.
 _MOST_RUN_US: Final = 500_000
 
 
 def run_early() -> None:
     """Raise this process above normal priority."""
-    # Without the permission, a busy neighbour can delay the process a little; the systemd unit
-    # grants it.
+    # The systemd unit grants the permission. Without it, other busy processes delay this one a
+    # little.
     with contextlib.suppress(PermissionError):
         os.nice(_NICENESS)
 

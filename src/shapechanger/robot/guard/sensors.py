@@ -14,8 +14,9 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SENSORS, SensorDriver
 from shapechanger.robot.hardware import Hardware
 
-# Larger values are more cautious, and the most cautious reading is used: the smaller of two speeds,
-# so that a turning track does not hide a stalled one. Otherwise the last reading is used.
+# Rank of a reading: if several sensors measure a quantity, the reading of the highest rank is used,
+# such as the smaller speed, so that a turning track does not hide a stalled one. Quantities that
+# are not listed use the last reading.
 _CAUTION: Final[dict[str, Callable[[float], float]]] = {
     "bump": operator.pos,
     "collision": operator.pos,
@@ -75,7 +76,7 @@ class Sensing:
 
 
 _MOST_READ_NS: Final = 20_000_000
-"""Longest response time of a sensor, ns; it delays all stops."""
+"""Longest permitted response time of a sensor, ns: a slow sensor delays all stops."""
 
 
 class Sensors:

@@ -2,12 +2,12 @@
 
 It is the parent of both and does nothing else, so that little can fail. A dead or silent guard
 cannot put the outputs to rest, and a Raspberry Pi keeps the levels of its pins; the supervisor then
-does it, retrying until they obey. After that both are restarted, and the new guard starts in an
-emergency stop, which only a person can end.
+puts them to rest, retrying until they obey. It then restarts both processes, and the new guard
+starts in an emergency stop, which only a person can end.
 
 Exit codes: 0 if asked to end (SIGTERM, SIGINT, SIGHUP, or an order "end" to the guard); 1 if the
 processes failed too often; 2 if it cannot start; 3 if, at its end, an output did not obey or a
-killed guard did not exit for some seconds. Except for 3, the outputs report that they are at rest.
+killed guard did not exit for some seconds. With all other codes, the outputs are at rest.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Child:
         name: Name of the process.
         beaten_ns: Time of the last heartbeat, or of the start before the first, ns.
         has_beaten: Whether there was a heartbeat.
-        killed: Whether it was killed; a process stuck in the kernel survives that.
+        killed: Whether SIGKILL was sent; a process stuck in the kernel does not exit.
     """
 
     def __init__(
@@ -71,8 +71,8 @@ class Child:
                 # Ctrl-C goes to the supervisor, which ends its children in order.
                 process_group=0,
             )
-        # Signals the exit at once. The end of the heartbeat does too, but not if a grandchild holds
-        # the socket.
+        # Becomes readable when the process exits. The heartbeat's socket does too, unless a
+        # grandchild has inherited it.
         self._pidfd = os.pidfd_open(self._process.pid)
 
     @property
@@ -141,7 +141,7 @@ class Restarts:
 
     @property
     def pause_s(self) -> float:
-        """Delay before the restart that was counted last, s; it doubles each time."""
+        """Delay before the restart that was counted last, s; it grows with each recent restart."""
         return _PAUSE_S * (2 ** (len(self._times_ns) - 1) - 1)
 
     def may_restart(self, now_ns: int) -> bool:
@@ -305,7 +305,7 @@ class Supervisor:
         started_ns = time.monotonic_ns()
         until_ns: int | None = None
         while True:
-            has_ended = guard.has_ended()  # Checked first: it may still write until it has ended.
+            has_ended = guard.has_ended()  # Checked first: a guard may write until it has ended.
             self._make_safe()
             now_ns = time.monotonic_ns()
             if self._is_safe and has_ended:

@@ -74,13 +74,13 @@ def address_here(host: str, port: int) -> Address:
 
 def cannot_listen(host: str, port: int, error: OSError) -> RobotError:
     """Return the error of a robot that cannot be served at an address."""
-    # Python adds the address to the text of the system; error numbers of the resolver are negative.
+    # Python adds the address to the system's text; errors of the resolver have negative numbers.
     why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
     return RobotError(f"Cannot listen at {host} port {port}: {why}. Is the robot served already?")
 
 
 def _is_ip(text: str, version: int) -> bool:
-    ip = _ip(text)  # Python takes any text as the zone after a "%".
+    ip = _ip(text)  # Python accepts any text after a "%" as the zone.
     return ip is not None and ip.version == version and not {"/", "@"} & set(text)
 
 

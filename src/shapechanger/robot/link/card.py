@@ -31,14 +31,13 @@ class RobotCard(msgspec.Struct, frozen=True, kw_only=True):
         slew_per_s: Fastest change of each action away from rest, 1/s; 0 for no limit.
         slew_down_per_s: Fastest change of each action towards rest, 1/s; 0 for no limit.
         deadline_ms: Longest time that a command acts, ms; the guard enforces it.
-        max_observation_age_ms: Oldest observation that a command may answer, ms.
-        reward: Weights of the task, keyed by name.
+        max_observation_age_ms: Largest age of the observation that a command answers, ms.
+        reward: Weights of the reward, keyed by name.
         reset: Commands that return the robot to the start: values and duration, s, of each; empty
             for none.
         arming: Who may arm the robot.
         clock: Source of the robot's time.
-        turning: Turn at full steering, rad for each metre and for each second; None if not
-            measured.
+        turning: Turn at full steering, rad/m and rad/s; None if not measured.
     """
 
     robot: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -71,10 +70,10 @@ def card_of(
     """Return the card of a robot.
 
     Args:
-        profile: The robot.
-        arming: Who may arm it; "" for the setting of the profile.
-        clock: Source of its time.
-        pictures: Whether its camera is used.
+        profile: Profile of the robot.
+        arming: Who may arm the robot; "" for the setting of the profile.
+        clock: Source of the robot's time.
+        pictures: Whether the robot's camera is used.
     """
     camera = profile.camera if pictures else None
     same = {n: getattr(profile, n) for n in RobotCard.__struct_fields__ if hasattr(profile, n)}

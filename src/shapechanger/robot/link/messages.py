@@ -76,7 +76,7 @@ class Hello(ClientMessage, frozen=True):
         name: Display name.
         role: Kind of client.
         pace: Whether the clocks or the client set the pace.
-        frames: Whether observations carry frames.
+        frames: Whether observations contain frames.
     """
 
     version: int
@@ -94,8 +94,8 @@ class Command(ClientMessage, frozen=True):
         seq: Number of the command, larger than the one before.
         answers: `seq` of the observation that the command answers.
         values: One number for each action of the robot, in the order of its action layout.
-        ttl_ms: Lifetime from the arrival, ms; the robot's deadline holds if it is shorter.
-        scale: Cap of the client, 0 to 1, by which the values are multiplied.
+        ttl_ms: Lifetime from the arrival, ms; the robot's deadline applies if it is shorter.
+        scale: Factor of the values, 0 to 1, by which a client limits its commands.
     """
 
     seq: _Sequence
@@ -152,12 +152,12 @@ class Ping(ClientMessage, frozen=True):
 class Suggest(ClientMessage, frozen=True):
     """Values that a client without control would command; the robot does not apply them.
 
-    A suggestion is shown to all clients (`Observation.suggested`) and recorded, and gives credit
-    for the next observation, as a command does. It expires after `Welcome.deadline_ms`, and when
-    its sender leaves or takes control.
+    A suggestion is shown to all clients (`Observation.suggested`) and recorded. Like a command, it
+    requests the next observation. It expires after `Welcome.deadline_ms`, and when its sender
+    disconnects or takes control.
 
     Attributes:
-        seq: Number of the suggestion, larger than the one before. A refusal names it.
+        seq: Number of the suggestion, larger than the one before; see `Refused.seq`.
         answers: `seq` of the observation that the suggestion answers.
         values: One number for each action of the robot, in the order of its action layout.
     """
@@ -305,7 +305,7 @@ class Observation(RobotMessage, frozen=True):
         sources: Source of each quantity: name of the sensor, "estimated" or "absent".
         action_applied: Applied outputs, in the order and units of the command, after caps, slew
             and reflexes.
-        applied_seq: `seq` of the command behind them; None while the robot rests by itself.
+        applied_seq: `seq` of the applied command; None while the robot rests without a command.
         applied_ns: Time at which that command reached the outputs.
         command_ns: Time at which that command arrived.
         stop_reason: Reason why the robot does not follow the command, a sentence; "" if it does.
@@ -405,14 +405,14 @@ class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
     """One episode in a list.
 
     Attributes:
-        id: Name of its folder.
+        id: Name of the episode's folder.
         steps: Number of steps.
         kept: Number of steps that are not dropped.
         seconds: Duration of the kept steps, s.
         closed: Whether it was closed; False for the episode being recorded.
         created: Start, ISO 8601 in UTC.
         driver: Name of the driver.
-        outcome: How it ended, such as "collision", or ""; the error if it cannot be read.
+        outcome: How the episode ended, such as "collision", or ""; the error if it is unreadable.
     """
 
     id: _Episode

@@ -99,7 +99,7 @@ def starter_text(
     kind: str, path: str | os.PathLike[str], robot_name: str, camera: str = "", arming: str = ""
 ) -> str:
     """Return the text of a new profile, with the checks of `write_profile`, without writing it."""
-    import tomlkit  # Nothing that drives a robot needs it.
+    import tomlkit  # Only writing profiles needs it.
 
     shipped = shipped_profiles()
     if kind not in shipped:
@@ -116,7 +116,7 @@ def starter_text(
     elif driver != before.get("driver"):
         table: Any = tomlkit.table()
         table["driver"] = driver
-        # Other settings belong to the other camera.
+        # The other settings are specific to the previous camera.
         table.update({key: before[key] for key in ("size", "fps") if key in before})
         table.add(tomlkit.nl())
         document["camera"] = table
@@ -139,7 +139,7 @@ def write_profile(
         path: The new file, which must not exist.
         robot_name: Name of the new robot.
         camera: A key of `CAMERAS`; "" for the camera of the shipped profile.
-        arming: "person" or "anyone"; "" for the rule of the shipped profile.
+        arming: "person" or "anyone"; "" for the setting of the shipped profile.
 
     Raises:
         UnknownName: If there is no shipped profile or no camera of this name.
@@ -170,7 +170,7 @@ def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile
         UnknownName: If a table is not in the file.
         OutputError: If the file cannot be written; it is then unchanged.
     """
-    import tomlkit  # Nothing that drives a robot needs it.
+    import tomlkit  # Only writing profiles needs it.
 
     target = Path(path).resolve()
     before = profile_text(target)

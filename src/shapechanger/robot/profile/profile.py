@@ -18,7 +18,7 @@ from shapechanger.robot.drivers.chip import SENSORS, Text
 
 _INF: Final = math.inf
 # Unit, smallest and largest value of each quantity in `GuardState.quantities`, in the order of the
-# state, and the kind of sensor that measures it (see `SensorPlan.measures`). The guard concludes
+# state, and the kind of sensor that measures it (see `SensorPlan.measures`). The guard derives
 # stalls from a measured speed, and collisions from a bumper or a stall.
 QUANTITIES: Final = {
     "speed": ("m/s", -_INF, _INF, "speed"),
@@ -110,10 +110,10 @@ class RobotTable:
         body: Kind of robot, such as "car".
         control_hz: Expected rate of commands, Hz.
         calibrated: Date of the last `shapechanger robot calibrate`; None if there was none.
-        turn_deg_per_m: Turn for each metre at full steering, degrees, such as of a car; None if
-            not measured. Policies with waypoints need it on board.
-        turn_deg_per_s: Turn for each second at full steering, degrees, for vehicles that turn in
-            place, such as a tank; None if not measured.
+        turn_deg_per_m: Turn per metre at full steering, degrees; None if not measured. Policies
+            with waypoints need it on board.
+        turn_deg_per_s: Turn per second at full steering, degrees, of a vehicle that turns in place,
+            such as a tank; None if not measured.
     """
 
     name: Text
@@ -130,7 +130,7 @@ class CommandTable:
 
     Attributes:
         max_observation_age_ms: Largest age of the observation that a command answers, ms.
-        arming: Who may arm it: only a person, or anyone, including programs.
+        arming: Who may arm the robot: only a person, or anyone, including programs.
     """
 
     max_observation_age_ms: Annotated[int, Meta(ge=20, le=5000)] = 400
@@ -142,9 +142,9 @@ class Profile(GuardPlan, RobotTable, CommandTable):
     """A robot: actions, outputs, sensors, limits, camera and reward.
 
     Attributes:
-        path: The file that it was read from.
-        camera: Its camera; None without one.
-        reward: Weights of the task, as in `Welcome.reward`: "velocity" per metre forward,
+        path: File of the profile.
+        camera: Plan of the camera; None for a robot without a camera.
+        reward: Weights of the reward, as in `Welcome.reward`: "velocity" per metre forward,
             "collision" per collision, "stall" per second of stall, and "collision_ends_episode",
             1 or 0.
         reset: The reset routine; empty for none.
@@ -157,7 +157,7 @@ class Profile(GuardPlan, RobotTable, CommandTable):
 
     @property
     def turning(self) -> tuple[float, float] | None:
-        """Turn at full steering, rad for each metre and for each second; None if not measured."""
+        """Turn at full steering, rad/m and rad/s; None if not measured."""
         if self.turn_deg_per_m is None and self.turn_deg_per_s is None:
             return None
         return math.radians(self.turn_deg_per_m or 0.0), math.radians(self.turn_deg_per_s or 0.0)
@@ -170,9 +170,8 @@ class Profile(GuardPlan, RobotTable, CommandTable):
         """Return the layout of commands.
 
         The range is the full range of each action. The caps of the robot clip commands, and
-        `action_applied` shows the result. The action of a tendon has a gain in newtons, from its
-        pretension at 0 to its largest tension at 1, or in metres wound in where its length is
-        controlled.
+        `action_applied` shows the result. The gain of a tendon's action is the rise of its tension
+        from 0, the pretension, to 1, N; if its length is controlled, the length wound in, m.
         """
         spans = _tendon_spans(self.outputs)
         features: list[Feature] = []

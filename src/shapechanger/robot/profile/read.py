@@ -56,7 +56,7 @@ class ResetKeys(Keys, frozen=True, kw_only=True):
     """Keys of a step of the reset routine; see `ResetStep`.
 
     Attributes:
-        values: Value of each action within its caps; other actions are at rest.
+        values: Value of each action, within its caps; actions that are not listed are at rest.
         seconds: Duration of the step, s.
     """
 
@@ -72,8 +72,8 @@ class EnableKeys(Keys, frozen=True, kw_only=True):
 
     Attributes:
         pin: Pin that the guard toggles.
-        hold_ms: How long the one-shot holds the line after an edge. The guard toggles the pin at
-            each tick, every 10 ms, and may be a few ms late.
+        hold_ms: Time for which the one-shot holds the enable line after an edge, ms. The guard
+            toggles the pin at each tick, every 10 ms, and may be a few ms late.
     """
 
     pin: Pin
@@ -104,14 +104,14 @@ TABLES: Final[Mapping[str, tuple[type, ...]]] = {
     "emergency_button": (EmergencyButtonKeys,),
     "servo_bus": (ServoBusKeys,),
 }
-"""Tables of a profile, with their keys; `action`, `output` and `sensor` hold one table per name."""
+"""Keys of the tables of a profile; `action`, `output` and `sensor` contain one table per name."""
 
 DRIVERS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
     "output": {"driver": OUTPUTS, "over": PULSES},
     "sensor": {"driver": SENSORS},
     "camera": {"driver": CAMERAS},
 }
-"""Chips among which a key of a table selects. The table then also has the keys of that chip."""
+"""Chips from which a key of a table selects; the table then also has the selected chip's keys."""
 
 GIVEN: Final = ("name", "measures", "settings", "rows")
 """Fields of `TABLES` and of chips that a table cannot set, because they are derived."""
@@ -196,7 +196,7 @@ def _read_action(table: Table) -> ActionPlan:
 
 
 def _read_sensor(table: Table) -> SensorPlan:
-    """Read one sensor; tables for its joints become its rows."""
+    """Read one sensor; the tables of its joints become `SensorPlan.rows`."""
     name, chip = table.place[-1], SENSORS[table.chosen("driver", SENSORS)]
     given: dict[str, Any] = {"name": name, "measures": chip.measures}
     if chip.rows is not None:
@@ -210,7 +210,7 @@ def _read_sensor(table: Table) -> SensorPlan:
 
 
 def _read_part(table: Table, plan: type, **given: Any) -> Any:
-    """Return a plan with the settings of its driver, and of the pulses if the driver takes any."""
+    """Return a plan with the settings of its driver, and of the pulses if the driver sends any."""
     drivers = DRIVERS[str(table.place[0])]
     kinds: list[type[Keys]] = []
     for key, chips in drivers.items():
@@ -279,7 +279,7 @@ def _share_boards(root: Table, profile: Profile) -> Profile:
 
 
 def _board(output: OutputPlan) -> tuple[int, ...]:
-    """Return bus and address of the PCA9685 of an output; () without one."""
+    """Return bus and address of the PCA9685 of an output; () for an output without a PCA9685."""
     settings = output.settings
     return (settings["bus"], settings["address"]) if settings.get("over") == "pca9685" else ()
 
@@ -334,13 +334,13 @@ def _drives(profile: Profile, output: OutputPlan) -> bool:
     )
 
 
-# Default of `camera_stale_ms`, and its least value.
+# Default and smallest value of `camera_stale_ms`, ms.
 _CAMERA_STALE_MS: Final = 500
 _LEAST_STALE_MS: Final = 50
 
 
 def _check_limits(root: Table, profile: Profile) -> Profile:
-    """Refuse limits that need something that is missing or too slow."""
+    """Refuse limits that need a missing sensor, a missing camera, or a faster rate."""
     table, limits, camera = root.table("limits"), profile.limits, profile.camera
     if limits.deadline_ms * profile.control_hz < 1000:
         text = f"must be at least {1000 / profile.control_hz:.0f} ms, the time from one command "
@@ -370,7 +370,7 @@ _START_S: Final = 0.5
 
 
 def _join_servo_bus(root: Table, profile: Profile) -> Profile:
-    """Give the outputs and the sensor of the servo bus its settings."""
+    """Copy the settings of the servo bus to its outputs and its sensor."""
     servos = [output for output in profile.outputs if output.driver == DRIVER]
     sensing = [sensor for sensor in profile.sensors if sensor.driver == DRIVER]
     on_bus = root.table("servo_bus")

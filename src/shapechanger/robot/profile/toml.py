@@ -39,7 +39,7 @@ def line_of(text: str, place: Place) -> int:
     lines = text.split("\n")
 
     def depth(count: int) -> int:
-        """Return how many parts of `place` the first lines have, with all of the last statement."""
+        """Return how many parts of `place` are in the first lines, up to the end of a statement."""
         while True:
             with suppress(tomllib.TOMLDecodeError):
                 data: Any = tomllib.loads("\n".join(lines[:count]))
@@ -78,7 +78,7 @@ def shown(value: Any) -> str:
     return "a number too large to write"
 
 
-_MOST_NAMED: Final = 64  # Limit of the messages, see `shapechanger.robot.link.messages`.
+_MOST_NAMED: Final = 64  # Limit of the wire messages, see `shapechanger.robot.link.messages`.
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 _PATH: Final = re.compile(r" - at `\$\.(\w+)")
 
@@ -131,7 +131,7 @@ class Table:
         path: The file.
         text: The whole text of the file.
         place: Path of the table.
-        keys: Its keys and nested tables; anything else is refused.
+        keys: Keys and nested tables of the table; any other type is refused.
         decoded: All tables of the file that were decoded so far, with their `Keys`.
     """
 
@@ -185,7 +185,7 @@ class Table:
         return {name: self.table(name) for name in self.keys}
 
     def chosen(self, key: str, names: Iterable[str]) -> str:
-        """Return the value of a key that must be one of some names."""
+        """Return the value of a key, which must be one of `names`."""
         kind = inspect.LiteralType(tuple(names))
         if self.keys.get(key) not in kind.values:
             raise self._unfit(key, kind)
@@ -202,8 +202,8 @@ class Table:
         Args:
             kinds: Structs and dataclasses.
             given: Fields that are not keys of the table.
-            drivers: Chips that a key of the table chooses from, keyed by this key: an unknown key
-                may belong to another one.
+            drivers: Chips from which a key of the table selects, keyed by this key; the error about
+                an unknown key names the chips that have it.
         """
         given = given or {}
         known = {n: one for kind in kinds for n, one in fields_of(kind).items() if n not in given}

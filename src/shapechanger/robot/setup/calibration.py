@@ -40,9 +40,9 @@ def reading(output: OutputPlan, value: float) -> str:
 
 
 def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
-    """Return the changes for an output that was jogged, whole microseconds keyed by dotted name.
+    """Return a jogged output's changes of the profile: pulse widths, us, keyed by dotted name.
 
-    `found` has the values of its low end, middle and high end, -1 to 1.
+    `found` contains the values of the low end, middle and high end, -1 to 1.
     """
     jogged = pulsed_keys(output)
     widths = [round(jogged.width_us(value)) for value in found]
@@ -57,7 +57,7 @@ def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
 def motor_changes(
     output: OutputPlan, went: Literal["forward", "backward"], starts_at: float
 ) -> dict[str, Any]:
-    """Return the changes for a motor, keyed by dotted name.
+    """Return a motor's changes of the profile, keyed by dotted name.
 
     With a forward command the motor turned in the direction `went`, and it started to turn at a
     duty of `starts_at`, 0 to 1.
@@ -74,9 +74,9 @@ def motor_changes(
 
 
 def wheel_changes(sensor: str, wheel_m: float, measured_m: float) -> dict[str, float]:
-    """Return the changes for an encoder after the robot was pushed forward by 1 m.
+    """Return an encoder's changes of the profile, after the robot was pushed forward by 1 m.
 
-    One turn is `wheel_m` in the profile; it measured `measured_m`, negative for backward.
+    The profile states `wheel_m` per turn. The encoder measured `measured_m`, negative for backward.
     """
     if measured_m <= 0.0:
         raise RobotError(
@@ -87,12 +87,12 @@ def wheel_changes(sensor: str, wheel_m: float, measured_m: float) -> dict[str, f
 
 
 _START_TICKS: Final = 50  # Half a second: boot time of servos that were just powered.
-_READINGS: Final = 50  # Half a second; single readings differ by a count or two.
-# Chosen: half a percent of the longest excursion of a finger's tendon.
+_READINGS: Final = 50  # Readings that are averaged: single ones differ by a count or two.
+# Motion that is ignored: half a percent of the longest excursion of a finger's tendon.
 _STILL_M: Final = 0.2e-3
 _STILL_MS: Final = 300  # Time for which no servo may move.
-_WITHIN_MS: Final = 10_000
-_TRAVEL_M: Final = 0.06  # Limit of winding in.
+_WITHIN_MS: Final = 10_000  # Time limit of homing.
+_TRAVEL_M: Final = 0.06  # Most that a tendon may be wound in.
 
 
 def find_joint_zeros(

@@ -41,7 +41,7 @@ _CAMERAS: Final = ("dtoverlay.imx", "dtoverlay.ov5647", "dtoverlay.ov9281")
 
 
 def _text(path: Path | None) -> str:
-    """Return the content of a file; "" without one."""
+    """Return the content of a file; "" if it does not exist."""
     return path.read_text(encoding="utf-8", errors="replace") if path and path.exists() else ""
 
 
@@ -93,8 +93,8 @@ def write_unit(
 ) -> tuple[Path, bool]:
     """Write the unit next to a profile unless it exists; return it and whether it is new.
 
-    The profile need not exist yet. The `user` who runs it, by default this one, is a member of the
-    groups of its devices.
+    The profile need not exist yet. The service runs as `user`, by default the current one, who must
+    be a member of the groups of the robot's devices.
     """
     path = profile.absolute().parent / unit_name(robot)
     options = f" --credentials {unit_word(str(credentials.absolute()))}" if credentials else ""
@@ -169,7 +169,7 @@ class Machine:
         return next((path for path in paths if path.exists()), None)
 
     def settings(self) -> dict[str, str]:
-        """Return the settings in config.txt that apply to every model, without filtered ones.
+        """Return the settings in config.txt that apply to every model, not only to some.
 
         Parameters of the device tree have keys such as "dtparam.i2c", and the value "on" if the
         line gives none; overlays have keys such as "dtoverlay.imx219".
@@ -229,7 +229,7 @@ class SystemChange:
     is_made: Callable[[], bool]
     commands: tuple[RootCommand, ...] = ()  # Empty if it has to be made by hand.
     instead: str = ""  # Instruction for a person if there are no commands.
-    restarts: bool = False  # Whether it takes effect when the computer restarts.
+    restarts: bool = False  # Whether it takes effect only when the computer restarts.
 
 
 class Outcome(NamedTuple):
@@ -315,13 +315,13 @@ def _group(group: str, machine: Machine) -> SystemChange:
         f"{machine.user} is in the group {group}.",
         lambda: machine.user in (members() or ()),
         () if members() is None else (_root("usermod -aG", group, machine.user),),
-        f"There is no group {group} here, which Raspberry Pi OS has.",
+        f"This machine has no group {group}; Raspberry Pi OS has one.",
         restarts=True,
     )
 
 
 def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemChange]:
-    """Yield the settings of the computer that a robot needs, whoever runs it."""
+    """Yield the settings of the computer that a robot needs, for any user."""
 
     def line(
         name: str, state: str, text: str, is_made: Callable[[], bool], *more: RootCommand
