@@ -78,7 +78,7 @@ def test_what_fails_is_told_with_its_command(
     other = FakePi(tmp_path / "other", config=None, groups=())
     monkeypatch.setattr(other, "run", lambda _: "")
     found = _install(other, shipped("car"))
-    sentence = "There is no group gpio here, which Raspberry Pi OS has."
+    sentence = "This machine has no group gpio; Raspberry Pi OS has one."
     assert found["group gpio"] == ("FAILED", sentence)
     for part in ("no config.txt", "dtparam=strict_gpiod"):
         assert part in found["strict_gpiod"][1]

@@ -191,7 +191,7 @@ class Inbox:
             self._changed.notify_all()
 
     def fail(self, failure: LinkError) -> None:
-        """End all waits with an error; the first one counts."""
+        """End all waits with an error; only the first error is kept."""
         with self._changed:
             self.failure = self.failure or failure
             self._changed.notify_all()

@@ -23,10 +23,10 @@ from shapechanger.robot.client.operator import Preparation, Takeover, interrupti
 from shapechanger.robot.link.messages import Observation, Pace, Role, Welcome
 
 OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], object]
-"""Kind of reset."""
+"""How the robot is returned to its start; see `RemoteVehicleEnv`."""
 
 LATE: Final = 0.5
-"""Delay of a step up to which its deadline is met, as a share of the control period."""
+"""Longest delay of a step that meets its deadline, as a fraction of the control period."""
 
 _WAYS_TO_RESET: Final = ("operator", "person", "routine")
 _LOCKSTEP_S: Final = 10.0  # Time limit of a step in lockstep, where a robot waits for the env.
@@ -49,14 +49,14 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     `observation_layout` describes the numbers of the state.
 
     ## Reward
-    The sum of `info["reward_terms"]`, each of which is in `info` too, see `DriveReward`: metres
-    forward, collisions, seconds stuck. `info["reward_sources"]` names the source of `speed`,
+    The sum of `info["reward_terms"]`, each of which is also a key of `info` (see `DriveReward`):
+    metres forward, collisions, seconds stuck. `info["reward_sources"]` names the source of `speed`,
     `collision` and `stall`: a sensor, "estimated" or "absent". Terms of absent quantities are left
     out.
 
     ## Start
     `reset` waits until the operator has armed the robot, or runs the reset routine of its profile.
-    The first observation was made after that.
+    The first observation is captured after that.
 
     ## End
     Terminated by a collision, unless the reward is set otherwise. Truncated when the link is lost,
@@ -68,8 +68,9 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
 
     ## Info
     `action_applied`: applied outputs; `stop_reason`: why they differ from the action; `refused`:
-    why the robot refused the command of this step; `events`: sentences; `latency`: see `latencies`,
-    s; `frame_age`, s, and `frame_repeated`; `deadline_missed`: number of steps in this episode that
+    why the robot refused the command of this step; `events`: the robot's events, as sentences;
+    `latency`: delays, s, see `latencies`; `frame_age`, s; `frame_repeated`: whether the image is
+    the previous one; `deadline_missed`: number of steps in this episode that
     ended half a period late or more; `armed`, `emergency`; `absent`: features of the state without
     a measurement, which have the middle of their range; `captured_ns` and `decided_ns`: capture
     time of the frame, and arrival time of the applied command, ns of the robot's clock;
@@ -86,9 +87,9 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         pace: "realtime": a step lasts one control period of the robot; "lockstep": the robot waits
             for each command and answers one period later.
         reward: Weights that replace the profile's, keyed by name.
-        on_reset: "operator": a person puts the robot back and arms it; where anyone may arm it, the
-            env does so at once. "person": always a person. "routine": the reset routine of the
-            profile. A function: it is called with the seed.
+        on_reset: "operator": a person puts the robot back and arms it; if anyone may arm it, the
+            env arms it at once. "person": always a person. "routine": the reset routine of the
+            profile. A function is called with the seed.
         on_waiting: Called with a sentence that describes what a reset waits for; None for a warning
             in the log of `shapechanger.robot.client.operator`.
         reset_timeout_s: Time limit of a reset, s.
@@ -186,7 +187,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
 
     @property
     def newest_jpeg(self) -> bytes | None:
-        """JPEG of the newest observation's frame, as the robot sent it; None without one."""
+        """JPEG of the newest observation's frame, as the robot sent it; None without a frame."""
         return None if self._last is None or not self._spaces.has_image else self._last.jpeg
 
     def reset(
@@ -208,7 +209,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             self._client = ready.connect(self._connect)
             self._spaces.reconnect()
         robot = self._client
-        if self._on_reset == "routine" and not robot.welcome.reset:  # Before it moves.
+        if self._on_reset == "routine" and not robot.welcome.reset:  # Before the robot moves.
             raise RobotRefused(
                 f"The profile of {robot.welcome.robot} has no reset routine: add [[reset]] tables "
                 "to it, or let its operator put it back with on_reset='operator'."
@@ -226,7 +227,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._last = received = ready.first(robot, self._spaces)
         view = self._spaces.view(received)
         self._touches = False
-        self._reward_of(received.message, received.message)  # What it touches now does not count.
+        self._reward_of(received.message, received.message)  # Contacts at the start do not count.
         self._takeover = Takeover(allowed=self._interventions)
         self._missed, self._has_stepped = 0, False
         robot.events()  # Drop events from before the episode.
@@ -313,7 +314,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         return client
 
     def _next(self, robot: RobotClient, last: Received, sent_at: float) -> Received:
-        """Return the newest observation at the end of the control period, and always a new one."""
+        """Wait for the end of the control period and for a new observation; return the newest."""
         if self._pace == "lockstep":
             return robot.observation(last.message.seq, self._patience_s)
         limit_s = max(0.0, self._ends - time.monotonic()) + self._patience_s

@@ -78,7 +78,7 @@ def check_name(name: str) -> None:
 
 
 def known_folder() -> Path:
-    """Return the folder of the files."""
+    """Return the folder of the known robots' files."""
     config = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
     return Path(config) / "shapechanger" / "known"
 
@@ -98,7 +98,7 @@ def remember(robot: KnownRobot) -> Path:
         OutputError: If it cannot be written; an existing file is unchanged.
     """
     path = known_folder() / f"{robot.name}.toml"
-    # JSON strings are TOML strings, but for one character, which no field contains.
+    # JSON strings are TOML strings, except for one character, which no field contains.
     lines = [
         f"{field} = {json.dumps(getattr(robot, field), ensure_ascii=False)}\n" for field in _FIELDS
     ]
@@ -204,7 +204,7 @@ def open_console(robot: KnownRobot) -> str:
             raise LinkError(
                 f"No browser opens here: open {address} in one, or drive with --terminal."
             )
-        # If the file system reports access times.
+        # Reading the file changes its access time, if the file system records access times.
         written_ns, until_s = page.stat().st_atime_ns, time.monotonic() + _OPENED_WITHIN_S
         while page.stat().st_atime_ns == written_ns and time.monotonic() < until_s:
             time.sleep(_LOOK_EVERY_S)

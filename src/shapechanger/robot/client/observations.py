@@ -27,8 +27,8 @@ def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
     """Resize an image.
 
     If width and height shrink by whole numbers, each pixel is the rounded mean of its box.
-    Otherwise it is the pixel nearest to its middle. Nothing is cropped, so a change of proportions
-    stretches the image.
+    Otherwise each pixel is the nearest pixel of the original. Nothing is cropped, so a change of
+    proportions stretches the image.
 
     Returns:
         Shape (size[1], size[0], 3); the image itself if it has this size.
@@ -48,7 +48,7 @@ def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
 class View(NamedTuple):
     """Observation of an env, and fields for its `info`."""
 
-    observation: Any  # It shares no memory.
+    observation: Any  # Shares no memory with other observations.
     fresh: bool  # Whether its image differs from the previous one; True without images.
     absent: tuple[str, ...]  # Names of the state's features that no sensor measures now.
 
@@ -89,7 +89,7 @@ class RobotSpaces:
             space = gym.spaces.Dict(both) if self._has_state else image_space
         self.observation_layout = Layout(features)
         self.observation_space = space
-        self.picture: NDArray[np.uint8] | None = None  # The newest, at the camera's size.
+        self.picture: NDArray[np.uint8] | None = None  # Newest image, at the camera's size.
         self.reconnect()
 
     def reconnect(self) -> None:
@@ -133,7 +133,7 @@ class RobotSpaces:
         seq = received.message.frame_seq
         if received.jpeg is None:
             return False
-        if seq != self._tried_seq:  # An invalid frame is tried once, too.
+        if seq != self._tried_seq:  # Each frame is decoded at most once, even if it is invalid.
             self._tried_seq = seq
             with suppress(DemosError):
                 self.picture = decode_picture(received.jpeg, "")

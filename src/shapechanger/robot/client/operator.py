@@ -26,7 +26,7 @@ class Preparation:
     """Steps of one reset, with one time limit for all of them."""
 
     timeout_s: float
-    on_waiting: Callable[[str], object] | None  # Gets a sentence on each wait; None to log them.
+    on_waiting: Callable[[str], object] | None  # Called with a sentence; None to log it.
     known_as: str  # Name of the known robot; "" for an address.
     _since: float = field(default_factory=time.monotonic)
     _reported: set[str] = field(default_factory=set[str])
@@ -73,7 +73,7 @@ class Preparation:
         while True:
             seen = robot.ask().message
             if not seen.mine and self._left_s >= 0.0:
-                # A person has control, and gives it back to arm the robot for us.
+                # A person has control, and gives it back to arm the robot for the program.
                 self.take(robot)
                 continue
             if seen.mine and seen.armed and not seen.emergency:
@@ -159,9 +159,9 @@ class Takeover:
         return robot.suggest(values, answers=last.seq)
 
     def goes_on(self, seen: Observation) -> bool:
-        """Return True if the episode goes on without control of an armed robot.
+        """Return True while a person drives or is about to give control back.
 
-        It does while a person drives, or is about to give control back.
+        The episode then continues, although the program does not control an armed robot.
         """
         if not self._allowed or seen.emergency:
             return False

@@ -46,7 +46,7 @@ _LOOK_EVERY_S: Final = 0.1
 
 
 def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[EpisodeSummary]:
-    """Return the episodes on a robot, oldest first."""
+    """Return the episodes on a robot, or the `wanted` ones, oldest first."""
     page = robot.browse()
     found = list(page.episodes)
     while page.more and page.episodes:
@@ -63,8 +63,8 @@ def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[Episo
 def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
     """Download one episode, or the new part of it.
 
-    An incomplete episode is kept in a folder that readers ignore. Marks and edits that were made
-    on this machine follow the robot's, so that they override them.
+    An incomplete episode is kept in a folder that readers ignore. Marks and edits from this machine
+    are placed after those from the robot, so that they take precedence.
 
     Returns:
         Number of new lines from the robot, and number of marks and edits made on this machine.
@@ -76,7 +76,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
     file = lock(folder / STEPS, f"Another program fetches or changes {folder} at this moment.")
     try:
         have = _complete_lines(folder, file)
-        # Lines up to the last step are the robot's; marks and edits of both sides follow.
+        # Lines up to the last step come from the robot; marks and edits of both sides follow.
         begin = 1 + max((n for n, line in enumerate(have) if line.startswith(_STEP)), default=-1)
         edits, theirs = have[begin:], list[bytes]()
         piece = robot.fetch(name, max(begin - 1, 0))
@@ -193,7 +193,7 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
             "E arms it and starts · any other key cancels; during the replay, any key stops it."
         )
         while not (keys := terminal.keys(0.5)):
-            robot.acknowledge()  # Keeps the link alive meanwhile.
+            robot.acknowledge()  # Keeps the link alive.
         if keys != ["e"]:
             say("cancelled; nothing was played")
             return
@@ -249,7 +249,7 @@ def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
             raise
         except LinkError as error:
             raise LinkError(f"After {number} of {len(steps)} steps: {error}") from error
-        # Late steps are not caught up.
+        # A late step delays all later ones.
         due_s = max(due_s + period_s, time.monotonic())
     terminal.keys(max(0.0, due_s - time.monotonic()))  # The last command gets a full period, too.
     return f"played {len(steps)} steps"

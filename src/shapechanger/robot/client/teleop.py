@@ -17,12 +17,12 @@ from typing import Final, Self
 from shapechanger.errors import ShapechangerError
 
 FIRST_HOLD_S: Final = 0.6
-"""Hold time of a first press, s: terminals start repeating after up to 0.5 s. No press holds
+"""Hold time of a first press, s: terminals start repeating after up to 0.5 s. No press is held
 longer."""
 
 REPEAT_HOLD_S: Final = 0.2
 """Hold time of a repeated press, s: terminals repeat about 30 times a second. If another direction
-arrives meanwhile, it holds as long as a first press."""
+key is pressed, the earlier key is held as long as after a first press."""
 
 DIRECTIONS: Final = {
     "w": ("throttle", 1.0),
@@ -76,7 +76,7 @@ class HeldKeys:
             # The first repeat may come long before the first hold ends: never shorten it.
             until_s = max(now_s + REPEAT_HOLD_S, held.until_s)
         for other in self._held.values():
-            if now_s <= other.until_s:  # Its own repeats may stop here, because this key started.
+            if now_s <= other.until_s:  # Terminals repeat only the newest key.
                 other.until_s = max(other.until_s, other.pressed_s + FIRST_HOLD_S)
         self._held[action] = _Held(value, now_s, until_s)
         return True
@@ -165,7 +165,7 @@ class KeyParser:
         # A byte that is not UTF-8 becomes a lone surrogate.
         self._decoder = codecs.getincrementaldecoder("utf-8")("surrogateescape")
         self._text = ""  # Sequence that has begun.
-        self._is_reported = False  # It was reported as Escape, so its rest is ignored.
+        self._is_reported = False  # Whether it was reported as Escape; the rest is then ignored.
         self._is_pasted = False
         self._last_s = 0.0
 
@@ -194,7 +194,7 @@ class KeyParser:
             key = self._key(char)
             if key is not None:
                 keys.append(OTHER if self._is_pasted and key not in STOPS else key)
-        # Half a character does not delay Escape.
+        # An incomplete UTF-8 character does not delay Escape.
         if text or self._is_reported or self._text != _ESCAPE:
             self._last_s = now_s
         return keys
@@ -253,7 +253,7 @@ class KeyParser:
 def _as_typed(keys: list[str]) -> list[str]:
     """Return the keys of one read that a person can have meant.
 
-    A stop cancels the others. Three different keys at once are pasted text, which not all
+    A stop cancels all other keys. Three different keys at once are pasted text, which not all
     terminals mark, or old keys from a link that was interrupted.
     """
     stops = [key for key in keys if key in STOPS]
@@ -285,7 +285,7 @@ class Terminal:
         """Disable echo, line editing and Ctrl-S, and discard the keys pressed before."""
         tty.setcbreak(self._fd)
         mode = termios.tcgetattr(self._fd)
-        mode[0] &= ~termios.IXON  # Ctrl-S would hold up the output, and with it the keys.
+        mode[0] &= ~termios.IXON  # Ctrl-S would block the output, and so the reading of keys.
         termios.tcsetattr(self._fd, termios.TCSAFLUSH, mode)
         self._write(_MARK_PASTES)
         return self

@@ -31,7 +31,7 @@ from shapechanger.robot.drivers.chip import (
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
-if TYPE_CHECKING:  # The guard loads neither.
+if TYPE_CHECKING:  # The guard must not load these modules.
     from shapechanger.contract.world import World
     from shapechanger.layout import Feature
 
@@ -40,7 +40,7 @@ ADDRESS: Final = 0x36
 
 COUNTS_PER_TURN: Final = 4096
 
-_STATUS: Final = 0x0B  # RAW ANGLE follows it, high byte first: one transfer gives all three.
+_STATUS: Final = 0x0B  # RAW ANGLE follows, high byte first: one transfer reads all three bytes.
 _MAGNET_DETECTED: Final = 0x20
 _TOO_WEAK: Final = 0x10
 _TOO_STRONG: Final = 0x08
@@ -194,7 +194,7 @@ class Tca9548a(SimulatedChip):
 
 
 class SimulatedAs5600s(SimulatedChip):
-    """The AS5600 behind a multiplexer, at their common address; they have no settings.
+    """AS5600 chips behind a multiplexer, at their common address; they have no settings.
 
     `measured` returns one reading of a joint's angle, rad, and raises RobotError for an unknown
     joint.
@@ -220,7 +220,8 @@ class SimulatedAs5600s(SimulatedChip):
                 keys = self._joints[name]
                 turned = keys.direction * self._measured(name) / (2.0 * math.pi)
                 counts = (keys.zero + round(turned * COUNTS_PER_TURN)) % COUNTS_PER_TURN
-            known = dict(enumerate((status, *divmod(counts, 256)), _STATUS))  # Others are 0.
+            # All other registers are 0.
+            known = dict(enumerate((status, *divmod(counts, 256)), _STATUS))
             data = [old & known.get(register + i, 0) for i, old in enumerate(data)]
         return data
 
@@ -247,7 +248,7 @@ class SimulatedJoints(SimulatedSensor):
 
 
 def _features(plan: SensorPlan) -> list[Feature]:
-    """Return the angle of each joint, within half a turn of its zero."""
+    """Return a feature for the angle of each joint, within half a turn of its zero."""
     from shapechanger.layout import Element, Feature  # The guard needs no layouts.
 
     return [

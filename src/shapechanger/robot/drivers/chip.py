@@ -32,7 +32,7 @@ from shapechanger.robot.drivers.simulation import (
 )
 from shapechanger.robot.hardware import Hardware, load
 
-if TYPE_CHECKING:  # The guard loads neither.
+if TYPE_CHECKING:  # The guard must not load these modules.
     from shapechanger.contract.world import World
     from shapechanger.layout import Feature
 
@@ -146,7 +146,7 @@ def _kinds() -> tuple[type[BaseException], ...]:
 
 
 class I2cDevice:
-    """A chip on an I2C bus, whose errors name it; the base of its driver.
+    """Base class of the drivers of chips on an I2C bus, whose errors name the chip.
 
     Attributes:
         name: The name, such as "Sensor 'imu'", with the address, for messages.
@@ -252,7 +252,7 @@ class SensorChip:
         keys: Its keys in a profile, in addition to `driver`.
         open: Opens its driver.
         simulate: Its simulation; None if a twin reads the real sensor, such as a file.
-        features: Features of a state that it alone measures; None if `measures` determines them.
+        features: State features that only this sensor measures; None if `measures` determines them.
         rows: Keys of each nested table, such as the table of a joint; None if the sensor has no
             nested tables. They are decoded into the field `rows` of `keys`, keyed by table name.
     """
@@ -283,12 +283,12 @@ class OutputChip:
         open: Opens its driver.
         wire: Called with the output, its value at rest, and a function for the duty of a pin;
             returns a function that reads the state of the output from a twin's levels.
-        unpowered: State without power, if power goes through the one-shot of the enable line, as
-            it does for motors; None for a steering servo or a joint.
+        unpowered: State without power, if the enable line switches the power, as it does for
+            motors; None for a steering servo or a joint.
         obeys: Creates a stateful function from the value of the pulses to the value of the motor;
             None if both are equal.
         pulses: Keys of the pulse widths at -1, 0 and 1; empty for an output without pulses.
-        differs: Why its value may differ from the requested one.
+        differs: Why the applied value may differ from the requested one.
         lights: LEDs that replace it on a bench: the key of each pin, a label after the name of the
             output, and the value that lights it; empty if LEDs cannot replace it.
         drives: Whether it can propel a robot, regardless of its part.
@@ -330,7 +330,7 @@ _Chip = TypeVar("_Chip", SensorChip, OutputChip, PulseSource)
 @cache
 def _others() -> dict[str, SensorChip | OutputChip | PulseSource]:
     """Return the chips of other packages."""
-    from importlib.metadata import entry_points  # 2 MB that most guards do not need.
+    from importlib.metadata import entry_points  # Takes 2 MB, and most guards do not need it.
 
     found = {point.name: point.load() for point in entry_points(group=_GROUP)}
     for name, chip in found.items():
@@ -343,7 +343,7 @@ def _others() -> dict[str, SensorChip | OutputChip | PulseSource]:
 
 
 class Chips(Mapping[str, _Chip]):
-    """Chips of one kind, keyed by driver and loaded on demand, so that a guard loads only its own.
+    """Chips of one kind, keyed by driver and loaded on demand, because a guard needs only few.
 
     Args:
         kind: Class of the chips.

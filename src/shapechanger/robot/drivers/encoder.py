@@ -16,10 +16,10 @@ from shapechanger.robot.drivers.pins import NO_PIN, EdgeInput, OptionalPin, Pin
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
-if TYPE_CHECKING:  # Only a twin has a world.
+if TYPE_CHECKING:  # Only simulations need these.
     from shapechanger.contract.world import Readings, World
 
-# Time without an edge after which the wheel counts as standing.
+# Time without an edge after which the speed is 0.
 _STANDS_AFTER_S: Final = 0.5
 
 # Levels of the channels, a and b, as the wheel rolls forward: a leads.
@@ -31,7 +31,7 @@ class EncoderKeys(Keys, frozen=True, kw_only=True):
 
     Attributes:
         a: Pin of its first channel.
-        b: Pin of its second channel; -1 for one channel, which takes its sign from the command.
+        b: Pin of its second channel; -1 without one: the command then gives the sign of the speed.
         counts_per_turn: Rising edges of one channel for a turn of the wheel.
         wheel_m: Circumference of the wheel, m.
     """
@@ -57,13 +57,13 @@ class Encoder:
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         keys = EncoderKeys.of(plan.settings)
         self._two_channels = keys.b != NO_PIN
-        # Whole counts even out the unequal lengths of their edges.
+        # Speeds are measured over whole counts, because the edges of a count are unevenly spaced.
         edges_per_count = len(_FORWARD) if self._two_channels else 1
         self._edge_m = keys.count_m / edges_per_count
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._levels = [0, 0]  # A missing channel stays low.
         self._edges: deque[tuple[float, int]] = deque(maxlen=edges_per_count + 1)
-        self._has_new = False  # Edges since the last read.
+        self._has_new = False  # Whether there were edges since the last read.
         self._last_edge_ns = 0
         self._speed = 0.0
         self._sign = 1.0

@@ -19,12 +19,12 @@ from shapechanger.robot.drivers.pins import EdgeInput, Pin
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
-if TYPE_CHECKING:  # Only a twin has a world.
+if TYPE_CHECKING:  # Only simulations need these.
     from shapechanger.contract.world import World
 
 _TRIGGER_NS: Final = 10_000  # A pulse of 10 µs starts a ping.
 _CYCLE_NS: Final = 60_000_000  # The user guide: at least 60 ms from ping to ping.
-_MOST_MISSED: Final = 3  # Pings without an echo before it fails: about 200 ms, or 0.2 m at 1 m/s.
+_MOST_MISSED: Final = 3  # Pings without an echo before the sensor fails, about 200 ms.
 _SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for each degree.
 
 
@@ -34,7 +34,7 @@ class Hcsr04Keys(Keys, frozen=True, kw_only=True):
     Attributes:
         trigger: Pin of its trigger.
         echo: Pin of its echo, through a divider to 3.3 V.
-        max_m: Distance without an obstacle, m.
+        max_m: Largest distance that is reported, also without an obstacle, m.
     """
 
     trigger: Pin

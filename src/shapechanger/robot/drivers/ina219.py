@@ -14,7 +14,7 @@ from shapechanger.robot.drivers.chip import I2cDevice, I2cKeys, SensorChip, simu
 from shapechanger.robot.drivers.simulation import SimulatedChip
 from shapechanger.robot.hardware import Hardware
 
-if TYPE_CHECKING:  # Only a twin has a world.
+if TYPE_CHECKING:  # Only simulations need these.
     from shapechanger.contract.world import World
 
 _CONFIGURATION: Final = 0x00
@@ -27,7 +27,7 @@ _PERIOD_NS: Final = 100_000_000  # A battery changes slowly, and the bus is shar
 
 
 class Ina219Keys(I2cKeys, frozen=True, kw_only=True):
-    """Keys of an INA219. 0x40 is also the default of a PCA9685: solder a bridge on one."""
+    """Keys of an INA219. Its default, 0x40, is also a PCA9685's: change one by a solder bridge."""
 
     address: Annotated[int, Meta(ge=0x40, le=0x4F)] = 0x40
 

@@ -22,8 +22,8 @@ class _DutyKeys(Keys, frozen=True, kw_only=True):
     """Keys of a motor whose speed is a duty cycle.
 
     Attributes:
-        pwm_hz: Frequency of the PWM, Hz; gpiozero's takes up to 10 kHz.
-        start: Smallest duty that moves the motor; values just above 0 get it.
+        pwm_hz: Frequency of the PWM, Hz; gpiozero supports up to 10 kHz.
+        start: Smallest duty that moves the motor, used for values just above 0.
         full: Duty at full speed.
     """
 
@@ -38,7 +38,7 @@ class _DutyKeys(Keys, frozen=True, kw_only=True):
 
     @property
     def duty(self) -> Duty:
-        """Duty of a speed, and the reverse."""
+        """Conversion between speed and duty."""
         return Duty(self.start, self.full)
 
 
@@ -81,12 +81,12 @@ class PhaseEnableKeys(_DutyKeys, frozen=True, kw_only=True):
 class _DutyMotor:
     """Bidirectional motor on two pins; see `OutputDriver`.
 
-    `hz` has the frequency of the PWM of each pin, Hz, 0 for a plain output. The inputs of the motor
-    are the last two, after a pin that enables them.
+    `hz` maps each pin to the frequency of its PWM, Hz, 0 for a plain output. Its last two pins are
+    the inputs of the motor; a pin before them enables both.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware, hz: Mapping[Pin, int]) -> None:
-        from gpiozero import DigitalOutputDevice, PWMOutputDevice  # A twin's worlds need no pins.
+        from gpiozero import DigitalOutputDevice, PWMOutputDevice  # Simulations do not need them.
 
         *_, first, second = hz
         self._name = f"Output {plan.name!r} on GPIO{first} and GPIO{second}"
@@ -178,7 +178,8 @@ class PhaseEnable(_DutyMotor):
 
     def _drive(self, drive: float, written: float | None) -> None:
         phase, enable = self._first, self._second
-        if written is None or drive * written <= 0.0:  # Otherwise the motor would stutter.
+        # The motor is switched off only to change direction, because it would stutter.
+        if written is None or drive * written <= 0.0:
             enable.off()
             if drive:
                 phase.value = drive < 0.0

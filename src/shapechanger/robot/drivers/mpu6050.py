@@ -19,14 +19,14 @@ from shapechanger.robot.drivers.chip import I2cDevice, I2cKeys, SensorChip, simu
 from shapechanger.robot.drivers.simulation import SimulatedChip
 from shapechanger.robot.hardware import Hardware
 
-if TYPE_CHECKING:  # Only a twin has a world.
+if TYPE_CHECKING:  # Only simulations need these.
     from shapechanger.contract.world import World
 
 _CONFIG: Final = 0x1A
 _GYRO_CONFIG: Final = 0x1B
 _ACCEL_CONFIG: Final = 0x1C
 _ACCEL_XOUT_H: Final = 0x3B
-_MEASURED: Final = struct.Struct(">7h")  # From there: acceleration x y z, temperature, rate x y z.
+_MEASURED: Final = struct.Struct(">7h")  # Acceleration x y z, temperature, rate of turn x y z.
 _PWR_MGMT_1: Final = 0x6B
 _WHO_AM_I: Final = 0x75
 

@@ -1,8 +1,8 @@
 """PCA9685: sixteen servo channels over I2C with hardware timing.
 
 Registers and formulas: NXP, PCA9685 product data sheet, rev. 4 (2015-04-16), sections 7.3.1 to
-7.3.5. A PCA9685 repeats its last pulses indefinitely without commands; hence the pin for its OE
-input.
+7.3.5. Without commands, a PCA9685 repeats its last pulses indefinitely, so a profile may name a pin
+at its OE input, which disables them.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _ALL_OFF_H: Final = 0xFD  # ALL_LED_OFF_H.
 _PRESCALE: Final = 0xFE
 
 _AUTO_INCREMENT: Final = 0x20  # MODE1, AI.
-_SLEEP: Final = 0x10  # MODE1; the prescaler can be written only then.
+_SLEEP: Final = 0x10  # MODE1; the prescaler can be written only while this bit is set.
 _TOTEM_POLE: Final = 0x04  # MODE2, OUTDRV; outputs change at the stop of a transfer (OCH = 0).
 
 _OSCILLATOR_MHZ: Final = 25.0  # Internal oscillator; boards deviate, so calibrate the widths.
@@ -109,9 +109,9 @@ class Pca9685(I2cDevice):
         with device_errors(self.name), ExitStack() as undo:
             undo.callback(self.close)
             if keys.output_enable != NO_PIN:
-                from gpiozero import DigitalOutputDevice  # Boards without such a pin need none.
+                from gpiozero import DigitalOutputDevice  # Only needed with such a pin.
 
-                # OE is active low, and a resistor pulls it up until we drive it.
+                # OE is active low, and a resistor pulls it up until the pin is an output.
                 self._enable = DigitalOutputDevice(
                     keys.output_enable, active_high=False, pin_factory=hardware.pin_factory()
                 )
@@ -152,7 +152,7 @@ class Pca9685(I2cDevice):
         (mode,), (prescale,) = self.read_registers(_MODE1), self.read_registers(_PRESCALE)
         asleep = mode & _SLEEP or prescale != self._prescale
         if asleep:
-            # No pulses first, so that none restart with the oscillator.
+            # Pulses are turned off first, so that none restart with the oscillator.
             self.write_registers(_ALL_OFF_H, _FULL >> 8)
             self.write_registers(_MODE1, _AUTO_INCREMENT | _SLEEP)
             self.write_registers(_PRESCALE, self._prescale)
@@ -188,7 +188,7 @@ class Pca9685(I2cDevice):
             failed.pop_all()
 
 
-# The chips of this process, by hardware, bus and address, while a channel has them.
+# Open chips of this process, keyed by hardware, bus and address.
 _OPEN: Final = WeakValueDictionary[tuple[Hardware, int, int], Pca9685]()
 
 
@@ -267,7 +267,7 @@ class SimulatedPca9685(SimulatedChip):
         return pulses
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read bytes from a register on; without auto-increment all of that register."""
+        """Read bytes from a register on; without auto-increment, that register repeatedly."""
         return [self._registers[at] for at in self._addressed(register, length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:

@@ -70,14 +70,14 @@ class EdgeInput:
         pin: BCM number.
         pull: Direction of the internal pull resistor, "up" or "down".
         factory: Pin factory of gpiozero.
-        changed: Receives the time, s, on its own clock, and the new level. lgpio calls it from
-            its own thread.
+        changed: Called with the time, s, by the clock of `factory`, and the new level; lgpio calls
+            it in a thread.
     """
 
     def __init__(
         self, pin: int, pull: str, factory: Any, changed: Callable[[float, int], None]
     ) -> None:
-        from gpiozero import InputDevice  # A twin's worlds need no gpiozero.
+        from gpiozero import InputDevice  # Simulations do not need gpiozero.
 
         self._changed = changed
         self._device = InputDevice(pin, pull_up=pull == "up", pin_factory=factory)

@@ -33,7 +33,7 @@ Width = Annotated[int, Meta(ge=500, le=2500)]
 
 
 class PulsedKeys(Keys, frozen=True, kw_only=True):
-    """Keys of an output that takes pulses.
+    """Keys of an output that is controlled by pulses.
 
     Attributes:
         over: Source of the pulses.
@@ -170,7 +170,7 @@ _LIT_PIN: Final = (("pin", ", dimly", 1.0),)
 
 
 class _PulsedOutput:
-    """An output that takes pulses; see `OutputDriver`."""
+    """Output that is controlled by pulses; see `OutputDriver`."""
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         self._name = f"Output {plan.name!r}"
@@ -216,7 +216,7 @@ def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], Wi
     return state
 
 
-_DEG_PER_VALUE: Final = 90.0  # Assumed travel from end to end, a value of 2: 180 degrees.
+_DEG_PER_VALUE: Final = 90.0  # Assumes that a servo turns by 180 degrees from -1 to 1.
 
 
 class ServoKeys(PulsedKeys, frozen=True, kw_only=True):
@@ -226,8 +226,8 @@ class ServoKeys(PulsedKeys, frozen=True, kw_only=True):
         left_us: Pulse width at -1; larger than `right_us` for a servo that turns the other way.
         centre_us: Pulse width at 0.
         right_us: Pulse width at 1.
-        travel_deg_per_s: Largest speed; infinite for no limit. A servo is assumed to turn by 180
-            degrees from end to end; if yours turns by 90, double the speed.
+        travel_deg_per_s: Largest speed, degrees per second; infinite for no limit. A servo is
+            assumed to turn by 180 degrees from end to end; if yours turns by 90, double the speed.
     """
 
     widths: ClassVar = ("left_us", "centre_us", "right_us")
@@ -238,7 +238,7 @@ class ServoKeys(PulsedKeys, frozen=True, kw_only=True):
 
 
 class ServoDriver(_PulsedOutput):
-    """Servo; see `OutputDriver`. It gets no pulse before the first position."""
+    """Servo; see `OutputDriver`. No pulse is sent before the first position."""
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         super().__init__(plan, hardware)
@@ -257,7 +257,7 @@ class ServoDriver(_PulsedOutput):
         return applied
 
     def release(self) -> None:
-        """Stop the pulses, after which the next position is reached at any speed."""
+        """Stop the pulses; the speed of the next motion is not limited."""
         self._value = None
         super().release()
 
@@ -279,10 +279,10 @@ class EscKeys(PulsedKeys, frozen=True, kw_only=True):
         backward_us: Pulse width at full reverse.
         neutral_us: Pulse width at rest.
         forward_us: Pulse width at full speed.
-        arm_s: Time at neutral before it obeys, s.
-        reverse: "double" if it brakes at the first pulse backward and reverses at the second,
-            "none" if it cannot reverse.
-        brake_ms: How long "double" brakes, and then waits at neutral, ms.
+        arm_s: Time at neutral before the controller obeys, s.
+        reverse: "double" if the controller brakes at the first pulse backward and reverses at the
+            second, "none" if it cannot reverse.
+        brake_ms: Time for which "double" brakes, and then waits at neutral, ms.
     """
 
     widths: ClassVar = ("backward_us", "neutral_us", "forward_us")
@@ -297,9 +297,9 @@ class EscKeys(PulsedKeys, frozen=True, kw_only=True):
 class Esc(_PulsedOutput):
     """Electronic speed controller; see `OutputDriver`.
 
-    It arms after some time at neutral, until which only neutral is sent. A car's controller brakes
-    at the first pulse below neutral and reverses at the second: `reverse` "double" sends brake,
-    neutral and reverse in sequence. Pulses at neutral or above are sent at once.
+    A controller arms after some time at neutral; until then, only neutral is sent. A car's
+    controller brakes at the first pulse below neutral and reverses at the second, so `reverse`
+    "double" sends brake, neutral and reverse in sequence. Other pulses are sent at once.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:

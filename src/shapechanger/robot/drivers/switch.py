@@ -12,7 +12,7 @@ from shapechanger.robot.drivers.pins import EdgeInput, Pin
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
-if TYPE_CHECKING:  # Only a twin has a world.
+if TYPE_CHECKING:  # Only simulations need these.
     from shapechanger.contract.world import Readings, World
 
 
