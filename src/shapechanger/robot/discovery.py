@@ -120,7 +120,7 @@ async def withdraw(zeroconf: AsyncZeroconf) -> None:
 def _service(card: RobotCard, host: str, port: int, fingerprint: bytes) -> ServiceInfo:
     name = card.robot.replace(".", " ")  # A dot would start another label.
     label = name.encode()[:63].decode(errors="ignore")  # RFC 6763: 63 bytes.
-    # The addresses at which other machines reach it.
+    # The addresses at which other machines reach the robot.
     addresses = [ipaddress.ip_address(host)]
     if addresses[0].is_unspecified:
         every = map(ipaddress.ip_address, get_all_addresses())

@@ -19,7 +19,7 @@ REAL: Final = "shapechanger.robot.hardware:Hardware"
 
 
 class Clock:
-    """The machine's monotonic clock; a twin overrides all of it.
+    """The machine's monotonic clock; a twin overrides all methods.
 
     Attributes:
         is_real: Whether the hardware needs time to respond; a twin's chips respond at once.
@@ -41,8 +41,8 @@ class Clock:
                 time stands still.
 
         Returns:
-            False if only the limit was reached. A twin's time advances in steps that are granted;
-            the result is True exactly at each of them.
+            False if only the limit was reached. On a twin, whose time advances in steps, True
+            exactly at each step.
         """
         left_s = min((until_ns - time.monotonic_ns()) / 1e9, at_most_s)
         poll = select.poll()

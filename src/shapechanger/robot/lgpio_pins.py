@@ -23,7 +23,7 @@ class LowAtOncePin(LGPIOPin):
     """Pin that goes low immediately."""
 
     def close(self) -> None:
-        """Keep an output an output at its level; one with PWM goes low first.
+        """Leave an output as it is, at its level; an output with PWM goes low first.
 
         gpiozero would make it an input, which floats without a pull resistor. An output is freed
         when the chip is closed; the kernel then keeps its level or, with
@@ -75,5 +75,5 @@ class LowAtOnceFactory(LGPIOFactory):
             self._pulsed.add(pin)
         lgpio.tx_servo(self._handle, pin, width_us, frequency_hz)
         if width_us == 0:
-            # lgpio releases the pin at its current level, see the module.
+            # lgpio releases the pin at its current level, see the module's docstring.
             lgpio.gpio_write(self._handle, pin, 0)

@@ -145,15 +145,15 @@ class Service:
         return ServePlan(guard, fields, board.hardware, patience_ms=patience_ms)
 
     def make_known(self, name: str, plan: ServePlan, port: int) -> str:
-        """Store the twin's address for this machine, and return a message about it; "" if not.
+        """Store a twin as a known robot; return a message about it, or "" if it is not stored.
 
-        Without TLS, or with its own credentials and any free port, the caller passes it on.
+        It is not stored without TLS, nor with other credentials at any free port.
         """
         if self.insecure or (self.credentials is not None and not self.port):
             return ""
         credentials = load_credentials(self.credentials or credentials_folder(name))
-        plan.daemon["port"] = port  # A daemon that is started again keeps it.
-        with contextlib.suppress(LinkError):  # Not every name of a robot is one of a file.
+        plan.daemon["port"] = port  # A restarted daemon keeps the port.
+        with contextlib.suppress(LinkError):  # Some names of robots cannot be file names.
             return store(robot_at(str(address_here(self.host, port)), name, credentials))
         return ""
 

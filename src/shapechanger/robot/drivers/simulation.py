@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-if TYPE_CHECKING:  # It needs NumPy, and a guard loads none.
+if TYPE_CHECKING:  # This module needs NumPy, which a guard must not load.
     from shapechanger.contract.world import Readings
 
 
@@ -57,7 +57,7 @@ class Levels:
     """State of all outputs.
 
     Attributes:
-        duties: Share of the time at which a pin is high, for each driven pin.
+        duties: Duty cycle of each driven pin, 0 to 1, keyed by BCM number.
         pulses: Servo pulses, keyed by pin.
         channels: Pulses, keyed by channel of a chip.
         edges_ns: Time of the last change of a pin between low and high, ns, without PWM.
@@ -87,7 +87,7 @@ class Levels:
 
 
 DutyOf = Callable[[Levels, int], float]
-"""Share of the time at which a pin is high, 0 to 1; resistors decide for an undriven pin."""
+"""Duty cycle of a pin, 0 to 1; resistors determine it for a pin that is not driven."""
 
 
 class WiredOutput(NamedTuple):
@@ -144,9 +144,9 @@ class SimulatedSensor:
         self.levels: Mapping[int, int] = levels or {}
 
     def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
-        """Return the edges from the end of the last call to now, in the current world."""
+        """Return the edges between two times, ns, for the readings `seen` of the world."""
         return []
 
     def output_changed(self, t: int, pin: int, level: float) -> list[Edge]:
-        """Return the edges that will follow from the level or duty of an output, 0 to 1."""
+        """Return the edges that an output causes by its new level or duty, 0 to 1."""
         return []

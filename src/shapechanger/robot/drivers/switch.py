@@ -20,7 +20,7 @@ class SwitchKeys(Keys, frozen=True, kw_only=True):
     """Keys of bumper switches.
 
     Attributes:
-        pins: Pin of each.
+        pins: Pin of each switch.
         pull: "up" for switches to ground, "down" for switches to 3.3 V.
     """
 

@@ -23,15 +23,15 @@ from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSetting
 from shapechanger.robot.drivers.simulation import WiredOutput
 from shapechanger.robot.hardware import Hardware, ServoReply
 
-if TYPE_CHECKING:  # The guard loads none.
+if TYPE_CHECKING:  # The guard must not load this module.
     from shapechanger.layout import Feature
 
 Mode = Literal["off", "held", "stopping", "silent"]
 """Mode of the bus.
 
 "off": no servo has torque. "held": servos pull the requested tensions. "stopping": tensions ramp
-down, then the servos let go. "silent": nothing is sent any more, so that the servos' own watchdogs
-stop them, or without any the power switch.
+down, then the servos release. "silent": nothing is sent any more, so that the watchdogs of the
+servos stop them, or the power switch stops servos without a watchdog.
 """
 
 # One of these registers is read in each cycle, so a fault is detected within four cycles.
@@ -52,12 +52,12 @@ class ServoBus:
     for at most two timeouts.
 
     Args:
-        settings: The bus and its servos; `add` adds others until it is opened.
-        hardware: The hardware that has its port.
+        settings: The bus and its servos; `add` adds more servos until the bus is opened.
+        hardware: The hardware with the port of the bus.
 
     Attributes:
         servos: Servos, keyed by id.
-        users: Names of the outputs that have it open; closing the last one closes the bus.
+        users: Names of the outputs that use the bus; closing the last output closes the bus.
         mode: Mode of the bus.
         is_ready: Whether `set_up` has succeeded.
     """
@@ -205,7 +205,7 @@ class ServoBus:
         """Enable the torque of all servos, with zero tension until the first goal.
 
         Raises:
-            RobotError: If there is a fault, or a servo refuses; then all have let go.
+            RobotError: If there is a fault, or a servo refuses; all torques are then off.
         """
         if self.mode != "off" or self.reason or not self.is_ready:
             why = "they are already." if self.is_ready else "they are not set up."
@@ -312,7 +312,7 @@ class ServoBus:
         self._write("goal", {id_: one.goal for id_, one in self.servos.items()})
 
     def _ramp_left(self, now_ns: int) -> float:
-        """Return the share of the ramp of a stop that is left, 1 to 0."""
+        """Return the remaining fraction of a stop's ramp, 1 to 0."""
         gone_ns, ramp_ns = now_ns - self._stopped_ns, self._settings.ramp_ms * 1_000_000
         return 0.0 if gone_ns >= ramp_ns else min(1.0, 1.0 - gone_ns / ramp_ns)
 
@@ -369,21 +369,21 @@ class ServoBus:
 
 
 def _serial_port(settings: BusSettings) -> ServoPort:
-    from shapechanger.robot.drivers.servos.serial_port import SerialServoPort  # It needs an extra.
+    from shapechanger.robot.drivers.servos.serial_port import SerialServoPort  # Needs an extra.
 
     return SerialServoPort(settings)
 
 
-# Buses of this process, by hardware and device, while a driver has them.
+# Open buses of this process, keyed by hardware and device.
 _OPEN: Final = WeakValueDictionary[tuple[Hardware, str], ServoBus]()
 
 
 class TendonOutput:
     """A tendon as an output; see `OutputDriver`.
 
-    0 is its pretension in both kinds of control, so that all stops end the same, and 1 its largest
-    tension.
-    With control "length" values above 0 go from its longest to its shortest length.
+    The value 0 is the pretension in both kinds of control, so that all stops end the same. The
+    value 1 is the largest tension; with control "length", values above 0 go from the longest to the
+    shortest length.
 
     Attributes:
         device: The bus, which acts when all outputs are written.
@@ -457,7 +457,7 @@ class TendonSensor:
 
 
 def _features(sensor: SensorPlan) -> list[Feature]:
-    """Return length, speed and tension of each tendon."""
+    """Return the features of each tendon: length, speed and tension."""
     from shapechanger.layout import Element, Feature  # The guard needs no layouts.
 
     features: dict[str, list[Feature]] = {"length": [], "speed": [], "tension": []}

@@ -53,20 +53,20 @@ _REFUSALS: Final = {
     6: "the value is beyond a limit",
     7: "the register cannot be written now",
 }
-# Counts ahead of its position at which to set the goal of a servo that pulls in position mode.
+# Distance from the position to the goal of a servo that pulls in position mode, counts.
 _AHEAD: Final = 1024
 # Missed cycles in a row that make a fault.
 _MOST_MISSED: Final = 5
 # Consecutive cycles with a wrong voltage or temperature that make a fault.
 _BELIEVED_CYCLES: Final = 3
-# K below the model's temperature limit at which a servo is too hot.
+# Margin below the model's temperature limit from which a servo is too hot, K.
 _MARGIN_C: Final = 5.0
 # A single wrong goal may have been lost, and is replaced by the next one.
 _MAX_WRONG_GOALS: Final = 2
 # Length from the zero, m, that a tendon cannot reach in an intact finger. Chosen: the longest
 # excursion of a finger's tendon is 42 mm.
 _SHORTEST_M: Final = -0.06
-# Share of the speed without load, and time at it, with which a tendon counts as lost.
+# A tendon counts as lost if it winds in at this fraction of the speed without load for this time.
 _SLACK_SHARE: Final = 0.7
 _SLACK_NS: Final = 100_000_000
 
@@ -81,13 +81,13 @@ class TendonServo:
     pretension is detected at the next pull.
 
     Args:
-        settings: The servo.
-        bus: Its bus.
+        settings: Settings of the servo.
+        bus: Settings of the bus.
 
     Attributes:
-        settings: The servo.
+        settings: Settings of the servo.
         port: Port of the bus, once it is open.
-        zero: Position at the zero of its tendon, in counts; None without a zero.
+        zero: Position at the zero of the tendon, in counts; None if it is unknown.
         position: Position, as last read, in counts.
         goal: The last sent goal, in counts; see `ServoFamily.goal`.
         tension: Requested tension, N.
@@ -160,7 +160,7 @@ class TendonServo:
     def ramp_n(self, left: float) -> float:
         """Return the tension during a stop, N, with a share of the ramp left, 1 to 0."""
         if self.fault:
-            return 0.0  # Lets go at once, while the others ramp down.
+            return 0.0  # A faulty servo releases at once, while the others ramp down.
         start = self.stopped_at_n
         end = min(self.settings.pretension_n, start)  # A slack tendon is not pulled.
         return end + left * (start - end)
@@ -205,7 +205,7 @@ class TendonServo:
             raise RobotError(f"{text} has firmware {firmware}; {needed}.")
 
     def prepare(self) -> None:
-        """Set up the mode, the limit of the goal, no goal and no torque."""
+        """Set the mode and the limit of the goal, without torque and with a goal of 0."""
         family, servo = self._family, self.settings
         self.write("torque_enable", 0)
         self.write("mark", 0)  # A tripped watchdog blocks all goals.

@@ -41,10 +41,10 @@ class Register(msgspec.Struct, frozen=True):
         name: Name in the manual.
         address: Address of its first byte.
         size: Size in bytes, little-endian.
-        sign: Code of a negative number, two's complement or a sign in the highest bit; "" without.
+        sign: Code of negative numbers: "complement", or "bit" for a highest bit; "" if unsigned.
         initial: Value at delivery, and after power-on if it is not in the EEPROM.
-        takes: Ranges of the values that it takes; empty if it is read-only.
-        value: Value that it must have; None for any.
+        takes: Ranges of permitted values; empty if the register is read-only.
+        value: Value that the register must have; None for any.
         kept_bits: Bits that are not changed when `value` is set.
     """
 
@@ -64,7 +64,7 @@ class Register(msgspec.Struct, frozen=True):
         return value.to_bytes(self.size, "little", signed=self.sign == "complement")
 
     def decode(self, data: bytes, start: int = 0) -> int:
-        """Decode the value in `data`, which is at `start` there."""
+        """Decode the value that begins at index `start` of `data`."""
         part = data[start : start + self.size]
         value = int.from_bytes(part, "little", signed=self.sign == "complement")
         top = 1 << (8 * self.size - 1)
@@ -76,32 +76,31 @@ class ServoFamily(msgspec.Struct, frozen=True):
 
     Attributes:
         name: Name of the family.
-        protocol: Version of the packets in `dynamixel_sdk`; Feetech's follow 1.0, with the
-            instructions for several servos of 2.0. Addresses, lengths and checksums have 1 or 2
-            bytes.
+        protocol: Version of the packets in `dynamixel_sdk`. Feetech uses 1.0 with the instructions
+            of 2.0 for several servos. Addresses, lengths and checksums have 1 or 2 bytes.
         most_id: Highest id.
         baud_rates: Baud rates of servos and SDK.
         has_watchdog: Whether a servo stops by itself when its bus is silent. If false, a power
             switch must stop it, and without power it loses its count of turns.
-        alert: Bits of a reply's error that say that the hardware error status is not 0.
+        alert: Bits of a reply's error that are set while the hardware error status is not 0.
         refused: Bits of a reply's error with the reason of a refusal.
         errors: Descriptions of the bits of the hardware error status.
         speed_rpm: Unit of the speed, turns per minute.
-        modes: Value of `mode` for each control that it has.
-        eeprom_end: First address behind the EEPROM.
-        registers: Registers keyed by purpose; further ones only have a `value` to set.
+        modes: Value of `mode` for each supported control.
+        eeprom_end: First address after the EEPROM.
+        registers: Registers keyed by purpose; others only have a `value` to set.
 
             - `model_number`, `firmware`: Number of the model and version of the firmware.
             - `mode`: Operating mode.
             - `most`: Limit of `goal`, in the EEPROM.
             - `torque_enable`: 1 for torque, 0 for none.
-            - `mark`: Is 0 after a restart, and has another value meanwhile: the bus watchdog if
-              there is one, or an unlimited acceleration.
-            - `goal`: Goal of the current, or in control of the length its limit. Of a family
-              without control of the tension it is a limit in thousandths of the stall torque.
+            - `mark`: Reveals a restart, because it is 0 only after one: the bus watchdog if there
+              is one, or the acceleration.
+            - `goal`: Goal of the current; with control of the length, limit of the current. In a
+              family without control of the tension, limit in thousandths of the stall torque.
             - `goal_position`: Goal position.
             - `hardware_error`: Hardware error status.
-            - `lock`: Must be 0 to write to the EEPROM; without it that needs no torque.
+            - `lock`: Must be 0 to write to the EEPROM; families without it need the torque off.
             - `present`: Block of the present values that follow.
             - `current`, `speed`, `position`, `voltage`, `temperature`: Present values in counts,
               0.1 V and degrees Celsius.
@@ -143,7 +142,7 @@ class ServoModel(msgspec.Struct, frozen=True, array_like=True):
         family_name: Name of its family.
         number: Model number.
         ampere_per_count: Unit of its present current, A.
-        most_counts: Largest value of its goal, see `ServoFamily.goal`.
+        most_counts: Largest value of its `goal`, see `ServoFamily.registers`.
         stall_nm, stall_a: Stall torque and current at `volts`, N·m and A.
         no_load_rpm: Speed without load at `volts`, turns per minute.
         volts, least_v, most_v: Nominal, lowest and highest operating voltage, V.
@@ -191,7 +190,7 @@ class ServoModel(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def ampere_per_goal(self) -> float:
-        """Unit of its goal, A; for a goal in shares of the stall torque, of a motor at rest."""
+        """Unit of its goal, A; at rest, if the goal is a fraction of the stall torque."""
         is_current = "tension" in self.family.modes
         return self.ampere_per_count if is_current else self.stall_a / self.most_counts
 
@@ -228,14 +227,14 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
         name: Name of the tendon and of its output, such as "FDP".
         id: Id on the bus.
         model: Name of its model; see `MODELS`.
-        spool_radius_m: Radius at which the tendon leaves the spool, half its thickness included, m.
-        most_tension_n: Largest tension, N. The servo's own limit is set to it.
-        pretension_n: Smallest tension while it holds the tendon, N.
+        spool_radius_m: Radius of the tendon on the spool, with half the tendon's thickness, m.
+        most_tension_n: Largest tension, N, which is also set as the servo's limit.
+        pretension_n: Smallest tension while the servo has torque, N.
         homing_n: Tension for finding the zero, N.
         direction: 1 if rising positions wind the tendon in, -1 if they let it out.
         control: Control of its tendon.
         longest_m: With control "length": length beyond the zero at the lowest command, m.
-        shortest_m: The same at the highest command, m.
+        shortest_m: With control "length": length beyond the zero at the highest command, m.
         zero: Position while the finger is straight, in counts of 1/4096 turn.
     """
 
@@ -320,7 +319,7 @@ class ServoBusKeys(Keys, frozen=True, kw_only=True):
         watchdog_ms: Silence after which the servos stop by themselves, ms.
         ramp_ms: Time in which a stop lowers the tensions to the pretension, ms.
         answer_ms: Time for the servos to start an answer, ms: one silent servo must delay the guard
-            by less than the limit for sensors. The latency timer of an FTDI adapter must be below:
+            by less than the limit for sensors. The latency timer of an FTDI adapter must be less:
             `/sys/bus/usb-serial/devices/ttyUSB0/latency_timer`, by default 16 ms and at best 1 ms.
     """
 
@@ -336,7 +335,7 @@ class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
 
     Attributes:
         servos: Servos of one family, in the order in which they are read.
-        cut_ms: Time after which a power switch that is not fed has cut the servos' power, ms.
+        cut_ms: Time until a power switch that is no longer triggered cuts the servos' power, ms.
     """
 
     servos: tuple[ServoSettings, ...] = ()

@@ -70,7 +70,7 @@ class SimulatedMotor:
         no_load = model.no_load_rad_per_s
         lost = (model.friction_nm + model.viscous * no_load) / model.stall_nm
         self._electric_rad_per_s = no_load / (1.0 - lost)  # Speed without current and friction.
-        # In the middle of the count at which the finger is straight.
+        # The middle of the count at which the finger is straight.
         self._taut = self.angle = (settings.zero + 0.5) / _COUNTS_PER_RAD
         self.speed = self.current = self.tension = 0.0
         self.temperature = _ROOM_C
@@ -82,7 +82,7 @@ class SimulatedMotor:
         return self._model.stall_a * share
 
     def advance(self, goal_a: float, volts: float, travel_m: float, dt_s: float) -> None:
-        """Turn for one short step, while the far end of the tendon is `travel_m` towards it."""
+        """Turn for one short step; the tendon's far end is `travel_m` nearer than at the start."""
         model, lever = self._model, self._lever_m
         # The voltage drives less current at higher speed.
         least, most = min(self.current_at(-volts), 0.0), max(self.current_at(volts), 0.0)
@@ -136,14 +136,14 @@ _OVERLOAD: Final = 0x20
 
 _FIRMWARE: Final = 52
 _START_NS: Final = 300_000_000
-_STALL_AT: Final = 2.0 * math.pi / 32.0  # rad.
+_STALL_AT: Final = 2.0 * math.pi / 32.0  # Error of the position at the stall current, rad.
 
 
 class SimulatedServo:
-    """A servo.
+    """A simulated servo.
 
     Args:
-        settings: The servo.
+        settings: Settings of the servo.
         stiffness: Stiffness of its tendon, N/m.
 
     Attributes:
@@ -152,7 +152,7 @@ class SimulatedServo:
         mute, deaf: Whether it obeys without answering, and whether it receives no instructions.
         motor: Its motor.
         volts: Voltage of its supply; 0 without power.
-        pulls_a: Goal current in effect, A, with the sign of its registers; of a length its limit.
+        pulls_a: Goal current in effect, A, with its sign; with control of the length, its limit.
     """
 
     def __init__(self, settings: ServoSettings, stiffness: float) -> None:
@@ -279,7 +279,7 @@ class SimulatedServo:
         return ServoReply(failed, data)
 
     def _controlled_a(self) -> float:
-        """Return the current that its controller asks for, A."""
+        """Return the current that the servo's controller requests, A."""
         if self._pulls_angle is None or not self.pulls_a:
             return self.pulls_a
         most = abs(self.pulls_a)
@@ -328,7 +328,7 @@ class TendonWorld(Protocol):
         ...
 
 
-# Without such a world, each tendon pulls a massless spring with a damper between two stops.
+# In other worlds, each tendon pulls a massless spring with a damper between two stops.
 _SPRING_N_PER_M: Final = 300.0
 _DAMPER_NS_PER_M: Final = 60.0
 _NEAREST_M: Final = 0.02  # Largest travel of an end towards its spool; 0 is the other stop.
