@@ -43,7 +43,7 @@ class _Announced:
 
 
 def test_announced_robots_are_found(network: Zeroconf, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A dot in a name would start another label; an empty network has no robots."""
+    """Dots in a name are replaced, because a dot would start another label."""
     assert find(0.1, network) == []
     fake = _Announced()
     monkeypatch.setattr(discovery, "AsyncZeroconf", lambda: fake)

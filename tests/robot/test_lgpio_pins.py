@@ -1,4 +1,4 @@
-"""The Pi's pins, over a fake lgpio modelled on its source."""
+"""Pins of a Raspberry Pi, with a fake lgpio modelled on lgpio's source."""
 
 import collections
 import importlib
@@ -123,7 +123,7 @@ def test_active_low_output_stays_high_when_opened_and_closed(lgpio: _Lgpio) -> N
 
 
 def test_servo_pulses_are_whole_microseconds_and_end_low(lgpio: _Lgpio) -> None:
-    """A width of 0 sets the pin low, where lgpio keeps its present level."""
+    """A width of 0 sets the pin low; lgpio alone would keep the present level."""
     factory = _factory()
     factory.pulse(17, 1503, 50)
     assert (lgpio.pulses[17], lgpio.levels[17]) == (1503, 1)

@@ -1,4 +1,4 @@
-"""Pins that stay as they are, and robots that have them."""
+"""Mock pins that keep their level when they are closed, and shipped robots."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ def shipped(kind: str) -> Profile:
 
 
 class HeldPins(Hardware):
-    """gpiozero's mock pins, which stay as they are when they are closed."""
+    """gpiozero's mock pins, which keep their level when they are closed."""
 
     def __init__(self, kind: type[MockPin] = MockPWMPin) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Pins of a robot, the test of two that are joined by a wire, and LEDs instead of motors."""
+"""Pins of a robot, the test of two pins that a wire joins, and LEDs instead of motors."""
 
 from collections.abc import Callable, Iterator
 
@@ -43,13 +43,13 @@ def test_only_joined_pins_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     [((22, 20), "drive"), ((20, 6), "bumper"), ((19, 20), "enable line"), ((20, 26), "button")],
 )
 def test_pins_of_the_robot_are_never_toggled(pair: tuple[int, int], user: str) -> None:
-    """The test cannot start a motor."""
+    """The test of a wire refuses pins of the robot, so it cannot start a motor."""
     with pytest.raises(RobotError, match=user):
         check_jumper(*pair, _PLAN)
 
 
-def test_probes_that_cannot_measure() -> None:
-    """A pin of the robot, and a servo's pulses, which go on at rest."""
+def test_probes_that_cannot_measure_are_refused() -> None:
+    """A probe needs a free pin, and an output whose pin is low at rest."""
     with pytest.raises(RobotError, match="used by drive backward"):
         probed_pin(shipped("car"), 27)
     with pytest.raises(RobotError, match="needs a motor on an H-bridge"):
@@ -63,7 +63,7 @@ def _lit(kind: str, pins: HeldPins, ask: Callable[[str], bool | None]) -> dict[s
 
 
 def test_each_led_is_lit_alone(pins: HeldPins) -> None:
-    """The person is asked while it is lit; all are out at the end."""
+    """The person is asked while the LED is lit; all LEDs are off at the end."""
     numbers = [22, 27, 4, 17, 19]
     seen: list[list[int]] = []
 

@@ -22,7 +22,7 @@ def _parts(*findings: Finding | BaseException) -> Iterator[tuple[str, Iterator[F
     yield "driving", found()
 
 
-def test_a_report_names_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_is_anonymous(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A report names neither the computer nor its user, only the model of the board."""
     monkeypatch.setattr(socket, "gethostname", lambda: "annas-pi")
     monkeypatch.setattr(getpass, "getuser", lambda: "anna")

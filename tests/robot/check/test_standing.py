@@ -74,14 +74,14 @@ def _on(root: Path, profile: Profile, **more: Any) -> dict[str, Finding]:
     ],
 )
 def test_the_boot_configuration_is_read(tmp_path: Path, line: str, gpiod: str, speed: str) -> None:
-    """Encoders need a fast bus; of several lines, the last one counts."""
+    """Encoders need a fast bus; of several lines for a setting, the last one is in force."""
     _write(tmp_path, "boot/firmware/config.txt", f"# Bookworm\n{line}\n")
     found = _on(tmp_path, replace(shipped("finger"), camera=None, enable_pin=19))
     assert (found["strict_gpiod"].level, found["I2C speed"].level) == (gpiod, speed)
 
 
 def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path, car: Profile) -> None:
-    """No setting of a computer adds pins to it."""
+    """Checks of settings are unknown, because this computer has no config.txt."""
     found = _on(tmp_path, replace(car, sensors=()))
     assert (found["computer"].level, found["strict_gpiod"].level) == ("unknown", "unknown")
     assert "does not exist: a Raspberry Pi has it" in found["devices"].sentence
@@ -110,7 +110,7 @@ def test_the_systemd_unit_must_restart_and_make_safe(
 
 
 def test_missing_safety_hardware_is_reported(tmp_path: Path, car: Profile) -> None:
-    """Servo boards need OE, and motors and servos without a watchdog the one-shot and its pins."""
+    """Servo boards need OE; motors, and servos without a watchdog, need the one-shot."""
     found = _on(tmp_path, replace(car, outputs=(_SERVO,), enable_pin=None))
     assert {found["enable line"].level, found["output enable"].level} == {"bad"}
     assert _on(tmp_path, car)["enable line"].level == "good"
@@ -125,7 +125,7 @@ def test_missing_safety_hardware_is_reported(tmp_path: Path, car: Profile) -> No
 
 
 def _hardware(where: str = "", act: Any = None) -> Any:
-    """Return hardware and a camera without pins and buses, of which one method acts."""
+    """Return hardware without pins and buses, and a camera; the method `where` calls `act`."""
     made = MagicMock(clock=Clock())
     for name in ("pin_factory", "i2c", "servo_port"):
         getattr(made, name).side_effect = RobotError("Not here.")
@@ -138,7 +138,7 @@ def _hardware(where: str = "", act: Any = None) -> Any:
 
 @pytest.fixture
 def freed() -> Iterator[threading.Event]:
-    """An event that ends all hanging after the test."""
+    """An event that hanging methods wait for; it is set after the test."""
     event = threading.Event()
     yield event
     event.set()
@@ -153,7 +153,7 @@ def freed() -> Iterator[threading.Event]:
         (ValueError("Odd."), "Odd"),
     ],
 )
-def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
+def test_a_driver_that_hangs_or_fails_does_not_end_the_checks(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     freed: threading.Event,
@@ -162,7 +162,7 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
     error: Exception | None,
     text: str,
 ) -> None:
-    """Each check has a deadline, its failure is a finding, and all others are made."""
+    """Each check has a deadline; its failure is a finding, and all other checks are made."""
     monkeypatch.setattr(standing, "CHECK_S", 0.05 if error is None else 5.0)
     for name in ("dev/gpiochip0", "dev/i2c-1"):
         _write(tmp_path, name)
@@ -200,8 +200,8 @@ def _wired(profile: Profile, hardware: Any, *, motors_off: bool = True) -> Found
     )
 
 
-def test_a_well_wired_car(car: Profile) -> None:
-    """Everything is good, but whether the wheel's sensor counts needs a person."""
+def test_all_findings_of_a_well_wired_car_are_good(car: Profile) -> None:
+    """Only the wheel's sensor is unknown, because a person has to turn the wheel."""
     board = _board(car)
     found = _wired(car, board.hardware)
     assert [level for level, _ in found["resistors"]] == ["good"] * 5
@@ -214,15 +214,15 @@ def test_a_well_wired_car(car: Profile) -> None:
 
 
 def test_without_the_supply_off_no_output_is_touched(car: Profile) -> None:
-    """A motor without its resistor could start."""
+    """While the motors have a supply, a motor without its resistor could start."""
     board = _board(car)
     level, sentence = _wired(car, board.hardware, motors_off=False)["resistors"][0]
     assert (level, "--motors-off" in sentence) == ("unknown", True)
     assert not board.levels.keys() & {4, 17, 22, 27, 19}
 
 
-def test_pressed_switches_and_a_low_battery(car: Profile) -> None:
-    """The voltage is compared with the limit at which the robot stops; 0 V is a wire."""
+def test_pressed_switches_and_a_low_battery_are_reported(car: Profile) -> None:
+    """The voltage is compared with the robot's limit; 0 V is reported as a missing wire."""
     car = replace(car, limits=replace(car.limits, low_battery_v=50.0))
     board = _board(car)
     board.pins.stop_held = True
@@ -263,8 +263,10 @@ def test_the_servos_of_a_rig_answer() -> None:
         ("cat", {25: False}, "bad: GPIO25, OE of the servo board, is held low: fit 10 kOhm to"),
     ],
 )
-def test_missing_and_wrong_resistors(kind: str, held: dict[int, bool], expected: str) -> None:
-    """A pin that follows the Pi's own resistor has none; one that is held high is dangerous."""
+def test_missing_and_wrong_resistors_are_bad(
+    kind: str, held: dict[int, bool], expected: str
+) -> None:
+    """A pin that follows the Pi's own resistor has no external one."""
     pins = HeldPins(MockPin)
     for pin, level in held.items():
         holding = type("Held", (MockPin,), {"_get_state": lambda _, level=level: level})
@@ -274,7 +276,7 @@ def test_missing_and_wrong_resistors(kind: str, held: dict[int, bool], expected:
 
 
 def test_the_wiring_is_examined_on_a_computer(tmp_path: Path, car: Profile) -> None:
-    """The check needs pins and buses, and a robot that is not served."""
+    """The wiring is checked if the computer has pins and buses, and the robot is not served."""
     for name in ("dev/gpiochip0", "dev/i2c-1"):
         _write(tmp_path, name)
 
@@ -284,7 +286,7 @@ def test_the_wiring_is_examined_on_a_computer(tmp_path: Path, car: Profile) -> N
 
     wiring = {"resistors", "emergency button", "sensor"}
     assert wiring <= checks().keys()
-    # Whoever asked for the resistors is told why they are not tested.
+    # With `motors_off`, the finding explains why the resistors are not tested.
     without_pins = checks(root=tmp_path / "workstation")
     assert without_pins["resistors"].sentence == "Not tested: this computer has no pins."
     assert wiring & without_pins.keys() == {"resistors"}

@@ -66,7 +66,7 @@ class Robot:
     reward: dict[str, float] = field(default_factory=dict)
     version: int = m.VERSION
     clock: str = "twin"
-    silent: bool = False  # Sends nothing, on connections that stay open.
+    silent: bool = False  # Sends no messages, on connections that stay open.
     frozen: bool = False  # The camera sends no new frame.
     delay_s: float = 0.0  # Delay of each answer.
     garbage: bytes | None = None  # Sent instead of the next observation.
@@ -94,7 +94,7 @@ class Robot:
         self._frame_seq = 0
         self._started = threading.Event()
 
-    # As a client sees it.
+    # Values that clients use.
 
     @property
     def address(self) -> str:

@@ -72,7 +72,7 @@ def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Conne
     ],
     ids=["key", "plain", "older", "newer"],
 )
-def test_a_robot_that_is_not_ours_is_refused(
+def test_a_robot_with_another_key_or_version_is_refused(
     run: Run, version: int, changes: dict[str, str], text: str
 ) -> None:
     robot = run(version=version)
@@ -106,7 +106,7 @@ def test_another_certificate_is_refused_and_both_are_shown(run: Run) -> None:
     assert robot.messages == []
 
 
-def test_a_missing_robot_is_one_error(run: Run, credentials: object) -> None:
+def test_a_missing_robot_gives_one_error_without_a_chain(run: Run, credentials: object) -> None:
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
         known = robot.known

@@ -22,7 +22,7 @@ Connect = Callable[..., RobotClient]
 TIMEOUT_S = 0.3
 
 
-def test_a_black_hole_is_detected_in_time(run: Run, connect: Connect) -> None:
+def test_a_silent_connection_is_detected_in_time(run: Run, connect: Connect) -> None:
     robot = run()
     client = connect(robot, pace="lockstep", timeout_s=TIMEOUT_S)
     client.take()
@@ -64,7 +64,7 @@ def test_a_slow_robot_is_stale_and_not_lost(run: Run, connect: Connect) -> None:
     assert client.observation(timeout_s=10.0).message.seq == 1
 
 
-@pytest.mark.timeout(30)  # The connection's own is 60 s.
+@pytest.mark.timeout(30)  # The connection's timeout is 60 s.
 def test_closing_a_dead_connection_takes_no_time(run: Run, connect: Connect) -> None:
     robot = run()
     client = connect(robot, timeout_s=60.0)

@@ -92,7 +92,7 @@ def test_an_env_passes_the_checks(
 
 
 def test_layouts_name_images_and_states(run: Run, made: Made) -> None:
-    """Images have the requested size, frames the camera's."""
+    """Images have the requested size; `render` has the camera's size."""
     env = made(run(), state=True, size=(40, 30), render_mode="rgb_array")
     observation, action = layouts_of(env)
     assert observation.names == ("camera/image", *(f.name for f in STATE))
@@ -114,7 +114,7 @@ def test_the_reward_is_metres_forward(run: Run, started: Made) -> None:
     encoder = dict.fromkeys(("speed", "stall"), "encoder")
     assert info["reward_sources"] == encoder | {"collision": "bumper"}
     answers = [command.answers for command in robot.received(m.Command)]
-    assert answers == sorted(set(answers))  # Each answers the observation before.
+    assert answers == sorted(set(answers))  # Each command answers the previous observation.
 
 
 def test_a_collision_costs_once_and_ends_the_episode(run: Run, started: Made) -> None:
@@ -158,7 +158,7 @@ def test_an_unmeasured_quantity_is_absent(run: Run, made: Made) -> None:
 
 
 @pytest.mark.parametrize("clock", ["real", "twin"])
-def test_latencies_are_measured_where_they_can_be(run: Run, started: Made, clock: str) -> None:
+def test_the_measurable_latencies_are_reported(run: Run, started: Made, clock: str) -> None:
     robot = run(clock=clock)
     env = started(robot)
     latency = env.step(AHEAD)[-1]["latency"]
@@ -268,7 +268,7 @@ def test_reset_waits_for_the_operator(run: Run, made: Made) -> None:
     assert "`shapechanger robot drive tin` in another terminal, and there P" in sentences[0]
     env.step(AHEAD)
     env.reset(seed=0)
-    assert robot.received(m.Disarm)  # The operator may pick it up.
+    assert robot.received(m.Disarm)  # The operator may pick the robot up.
     assert len(sentences) == 2
 
 
@@ -368,7 +368,7 @@ def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
         gym.make(ID, robot="tim")
 
 
-def test_four_keys_drive_as_in_2017(run: Run, made: Made) -> None:
+def test_four_keys_drive_as_in_the_original_release(run: Run, made: Made) -> None:
     env = DiscreteDriving(made(run()), throttle=0.6, steering=0.4)
     env.reset(seed=0)
     applied = dict(forward=[0.0, 0.6], backward=[0.0, -0.6], right=[0.4, 0.0], left=[-0.4, 0.0])

@@ -43,7 +43,7 @@ def test_a_frame_outlives_its_observation() -> None:
     assert inbox.observation(2, 0.0).jpeg is None
 
 
-def test_the_first_failure_counts() -> None:
+def test_the_first_failure_is_raised() -> None:
     inbox = Inbox(lambda: 0.0, 1.0)
     inbox.fail(RobotRefused("First."))
     inbox.fail(LinkError("Second."))
@@ -74,7 +74,7 @@ def test_steps_that_end_a_little_late_keep_the_rate(late: list[float]) -> None:
 
 
 @given(slower=st.floats(1.0, 1.0 + 0.9 * LATE), steps=st.integers(1, 200))
-def test_a_robot_whose_clock_is_slower_is_followed(slower: float, steps: int) -> None:
+def test_steps_follow_a_robot_whose_clock_is_slower(slower: float, steps: int) -> None:
     now = begins = 100.0
     for i in range(1, steps + 1):
         arrived_at = 100.0 + i * slower * PERIOD

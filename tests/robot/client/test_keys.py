@@ -42,7 +42,7 @@ UNKNOWN = (
     *(b"\x1b[%d;1:3u" % key for key in b"wasdep \x1b"),
     *(b"\x1b[27;5;%d~" % key for key in b"wasdep"),
     b"\x1b[?31u",
-    # Mouse, focus, and replies to questions that another program asked.
+    # Mouse, focus, and replies to requests of another program.
     b"\x1b[<0;12;34M",
     b"\x1b[<0;12;34m",
     b"\x1b[32;12;34M",
@@ -130,7 +130,7 @@ def test_direction_keys_move_their_action(key: str, meaning: tuple[str, float]) 
         ),
     ],
 )
-def test_a_press_holds_until_its_time(
+def test_a_press_is_held_for_its_hold_time(
     presses: list[tuple[str, float]], now_s: float, throttle: float, steering: float
 ) -> None:
     keys = HeldKeys()
@@ -256,7 +256,7 @@ def test_a_stop_has_many_encodings(sequence: bytes, key: str) -> None:
         (b"wwwa\r", ["w", "w", "w", "a", "enter"]),
     ],
 )
-def test_a_read_with_many_keys_is_no_typing(
+def test_a_read_with_many_different_keys_moves_no_action(
     typed: tuple[int, Terminal], data: bytes, keys: list[str]
 ) -> None:
     keyboard, terminal = typed

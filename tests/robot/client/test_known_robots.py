@@ -26,7 +26,7 @@ def test_a_known_robot_round_trips() -> None:
     for missing in (recall, forget):
         with pytest.raises(UnknownName):
             missing("new-bright")
-    # Without encryption there may be no key.
+    # Without encryption, the key may be empty.
     assert KnownRobot("car", "car.local", "", "insecure").key == ""
 
 

@@ -32,7 +32,7 @@ class Served:
     """A daemon in its own thread.
 
     Attributes:
-        running: The daemon, to be used on its own loop only.
+        running: The daemon, which may only be used on its event loop.
     """
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **plan: Any) -> None:

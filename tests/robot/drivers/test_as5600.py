@@ -1,4 +1,4 @@
-"""Joint encoders, at the level of bytes."""
+"""Joint encoders, tested with the bytes on the I2C bus."""
 
 import math
 
@@ -20,7 +20,7 @@ def _registers(counts: int, status: int = 0x20) -> dict[int, int]:
 
 
 def _rig() -> tuple[FakeHardware, FakeBus]:
-    # Both channels show the same encoder; the twin simulates a real multiplexer.
+    # Both channels have the same encoder; the twin simulates a real multiplexer.
     hardware = FakeHardware({_MUX: {}, _ENCODER: _registers(1124)})
     return hardware, hardware.bus
 

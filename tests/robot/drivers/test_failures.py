@@ -53,14 +53,14 @@ class _Bench:
 
     @contextlib.contextmanager
     def failing(self, operation: int, takes_effect: bool) -> Iterator[None]:
-        """Let an operation fail."""
+        """Make operation number `operation` fail; suppress the error."""
         self.hardware.fault.arm(operation, takes_effect)
         with contextlib.suppress(RobotError):
             yield
         self.hardware.fault.disarm()
 
     def state(self) -> dict[str, Any]:
-        """Return what reaches the motor."""
+        """Return the levels and pulses at the motor."""
         chip = self.hardware.bus.chips[0x40]
         pins = {
             pin.info.name: float(pin.state)
@@ -106,7 +106,7 @@ def _benches(bench: Bench) -> Iterator[tuple[int, _Bench]]:
             return
 
 
-# `servos/test_faults.py` covers these.
+# Drivers that `servos/test_faults.py` covers.
 _ON_A_BUS = {"bus_servo"}
 
 
@@ -142,7 +142,7 @@ def test_after_a_failed_release_the_next_one_reaches_the_hardware(
 ) -> None:
     """After a failed release, a second release and a write both take effect."""
     expected: list[dict[str, Any]] = []
-    for operation, tried in chain([(0, bench())], _benches(bench)):  # None is number 0.
+    for operation, tried in chain([(0, bench())], _benches(bench)):  # No operation has number 0.
         output = tried.open()
         output.write(0.6, 0)
         with tried.failing(operation, takes_effect):

@@ -15,7 +15,7 @@ _values = st.floats(-1.0, 1.0)
 
 @given(value=_values, start=st.floats(0.0, 0.5), full=st.floats(0.6, 1.0))
 def test_duty_round_trips_within_a_step(value: float, start: float, full: float) -> None:
-    """The smallest value starts the motor; gpiozero truncates, which would make 28 of 0.29."""
+    """The smallest value starts the motor; the duty is a full percent, as gpiozero truncates it."""
     duty = Duty(start, full)
     size = duty.of(value)
     assert duty.size_at(size) == pytest.approx(abs(value), abs=0.011 / (full - start))
@@ -25,7 +25,7 @@ def test_duty_round_trips_within_a_step(value: float, start: float, full: float)
 
 @given(values=st.lists(_values, min_size=1, max_size=8))
 def test_the_sign_selects_the_pin(values: list[float]) -> None:
-    """The other pin is low, also meanwhile."""
+    """The pins are never high at the same time."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     for value in values:

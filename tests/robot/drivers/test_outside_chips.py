@@ -79,7 +79,7 @@ def test_chips_of_another_package_are_driven_on_the_twin() -> None:
 
 
 def test_an_entry_point_must_name_a_chip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Anything else is refused; a name of ours cannot be replaced."""
+    """Other objects are refused; the package's own drivers cannot be replaced."""
     _install(tmp_path, monkeypatch, f"servo = {_HERE}.relay:CHIP\nlux = {_HERE}.bh1750:LUX\n")
     with pytest.raises(
         RobotError, match=r"entry point lux in shapechanger\.drivers must name a Sen"
@@ -91,7 +91,7 @@ def test_an_entry_point_must_name_a_chip(tmp_path: Path, monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("name", sorted(shipped_profiles()))
 def test_a_driver_reads_the_keys_of_its_profile_from_a_plan(name: str) -> None:
-    """The settings of a plan survive JSON, and are the same keys again."""
+    """The settings of a plan round-trip as JSON, and as the keys of their driver."""
     plan = load_profile(shipped_profiles()[name]).guard_plan()
     assert GuardPlan.from_json(plan.to_json()) == plan
     pulsed = [output for output in plan.outputs if "over" in output.settings]

@@ -63,7 +63,7 @@ def test_controller_gets_neutral_until_it_is_armed() -> None:
     assert esc.write(1.0, 7_500 * MS) == 1.0
     assert hardware.factory.widths_us == {12: 2000}
     esc.release()
-    assert esc.write(1.0, 8_000 * MS) == 0.0  # It needs neutral again.
+    assert esc.write(1.0, 8_000 * MS) == 0.0  # The controller needs neutral again.
     esc.close()
     assert hardware.factory.widths_us == {12: 0}
 
@@ -88,7 +88,7 @@ def test_controller_brakes_before_it_reverses() -> None:
         sent.append((esc.write(-0.5, ms * MS), hardware.factory.widths_us[12]))
     assert sent == [(0, 1250), (0, 1250), (0, 1500), (0, 1500), (-0.5, 1250), (-0.5, 1250)]
     assert esc.write(0.0, 700 * MS) == 0.0
-    assert esc.write(-0.5, 800 * MS) == -0.5  # It has not gone forward.
+    assert esc.write(-0.5, 800 * MS) == -0.5  # The motor has not driven forward since.
     assert esc.write(0.5, 900 * MS) == 0.5
     assert esc.write(-0.5, 1000 * MS) == 0.0
     assert esc.write(0.5, 1050 * MS) == 0.5  # Forward acts at once.
@@ -153,7 +153,7 @@ def test_output_enable_is_low_only_while_something_is_sent() -> None:
     assert enable.state == 1.0
 
 
-def test_outputs_stay_off_while_a_channel_is_in_doubt() -> None:
+def test_outputs_stay_off_while_the_state_of_a_channel_is_unknown() -> None:
     hardware = FakeHardware({0x40: _asleep()})
     on_chip = _ON_CHIP | {"output_enable": 26}
     esc = hardware.output("esc", **on_chip | {"arm_s": 0.0}, channel=0)

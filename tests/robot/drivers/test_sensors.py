@@ -1,4 +1,4 @@
-"""Sensor drivers, at the level of pins and registers."""
+"""Sensor drivers, tested with fake pins and registers."""
 
 import math
 import struct
@@ -81,7 +81,7 @@ def _echo(hardware: FakeHardware, seconds: float) -> None:
 def test_echo_is_a_distance_of_pings_60_ms_apart() -> None:
     """The distance is half the echo time times the speed of sound, up to `max_m`.
 
-    Closer pings could receive the echo of the one before.
+    With shorter intervals, a ping could receive the echo of the previous ping.
     """
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)

@@ -35,7 +35,7 @@ def car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardP
 
 
 def quick_car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardPlan:
-    """The same car without slew limits."""
+    """The car of `car`, without slew limits."""
     plan = car(limits, stop)
     actions = tuple(replace(action, slew_per_s=float("inf")) for action in plan.actions)
     return replace(plan, actions=actions)

@@ -57,7 +57,7 @@ def test_a_state_for_a_closed_socket_means_a_lost_daemon(ends: Ends) -> None:
 
 @pytest.mark.parametrize("unread", [False, True])
 def test_a_closed_socket_means_a_lost_daemon(ends: Ends, unread: bool) -> None:
-    """States that it left unread reset the connection, which is no order."""
+    """If the daemon left states unread, the kernel resets the connection; this is no order."""
     channel, daemon = ends
     if unread:
         while channel.send(NO_STATE):  # As many as fit.

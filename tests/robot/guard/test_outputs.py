@@ -52,10 +52,10 @@ _SLOW = "Output steer: it turns no faster than its profile allows."
         (_CAR, (0.5, -0.4), (-0.4, 0.15), (0.1, -0.4), _SLOW),
         (_CAR, (0.5, -0.4), (-0.4, 0.05), (0.3, -0.4), _SLOW),
         (_CAR, (0.5, -0.4), (0.0, 0.05), (0.3, 0.0), f"{_WAITS.format('drive')} {_SLOW}"),
-        # A step is no deviation, nor is it motion.
+        # A difference of one pulse step is neither a deviation nor motion.
         (_CAR, (0.1, 0.0), (0.06, 0.15), (0.1, 0.0), ""),
         (_TANK, (0.2, 0.5), (0.06, 0.25), (0.0, 0.0), None),
-        # Mixed outputs show rest only.
+        # Outputs that mix several actions only show whether the actions rest.
         (_TANK, (0.2, 0.5), (0.0, 0.55), (0.2, 0.5), "Output left: it does not follow."),
         # The value farthest from rest counts.
         (_pair("esc"), (0.5,), (0.5, 0.0), (0.5,), _WAITS.format("right")),
@@ -116,7 +116,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> Mock:
 
 
 def _done(calls: Mock) -> list[Any]:
-    """Return the calls since the last time."""
+    """Return the calls since `_done` was last called."""
     found = list(calls.mock_calls)
     calls.reset_mock()
     return found
@@ -141,12 +141,12 @@ def test_outputs_are_written_released_and_closed_together(calls: Mock) -> None:
         assert bank.released is False
         bank.release()
     calls.reset_mock()
-    assert bank.close(10) == []  # What is released is not energised again.
+    assert bank.close(10) == []  # Released outputs are not energised again.
     assert _done(calls) == [call.drive.close(), call.steer.close()]
 
 
 def test_each_failure_of_an_output_is_reported(calls: Mock) -> None:
-    """A robot that is made safe reports outputs that do not close."""
+    """`make_safe` also reports outputs that cannot be closed."""
     bank = OutputBank(_CAR, Mock())
     stuck = OSError("stuck")
     for driver in (calls.drive, calls.steer):
@@ -164,14 +164,14 @@ def test_a_failure_of_a_bus_is_reported(calls: Mock) -> None:
     assert bank.rest(7) == ["no answer"]
 
 
-def test_an_output_that_cannot_be_opened_closes_those_before(calls: Mock) -> None:
+def test_if_an_output_cannot_be_opened_the_earlier_ones_are_closed(calls: Mock) -> None:
     calls.chips["servo"] = Mock(**{"open.side_effect": OSError("No power.")})
     with pytest.raises(OSError, match="No power"):
         OutputBank(_CAR, Mock())
     assert calls.mock_calls == [call.drive.close()]
 
 
-def test_a_bus_tells_why_it_is_not_ready(calls: Mock) -> None:
+def test_the_reason_why_a_bus_is_not_ready_is_returned(calls: Mock) -> None:
     bank, alive = OutputBank(_CAR, Mock()), Mock()
     assert bank.ready(alive) == ""
     calls.bus.ready.assert_called_once_with(alive)
@@ -180,7 +180,7 @@ def test_a_bus_tells_why_it_is_not_ready(calls: Mock) -> None:
 
 
 @pytest.mark.parametrize("source", [REAL, "module:function"])
-def test_what_a_stop_needs_is_imported_before(monkeypatch: pytest.MonkeyPatch, source: str) -> None:
+def test_preload_imports_modules_for_a_stop(monkeypatch: pytest.MonkeyPatch, source: str) -> None:
     """Missing libraries are no failure: a robot without pins may lack them."""
     found = {name: MagicMock() for name in ("load", "OUTPUTS", "PULSES")}
     for name, mock in found.items():

@@ -88,7 +88,7 @@ class _Bench:
         self.clock.events.sort(key=lambda event: event[0])
 
     def look(self, *times: int) -> None:
-        """Note the duty of the drive at times."""
+        """Record the duty of the drive at these times."""
         for ms in times:
             self.at(ms, lambda ms=ms: self.duties.update({ms: self.duty()}))
 
@@ -180,8 +180,8 @@ def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> 
     assert list(acting.outputs.items()) == [("drive", 0.5), ("steer", 0.5)]
 
 
-def test_states_without_news_are_sent_at_every_second_tick(make: _Make) -> None:
-    """News are sent at once, and a refusal once."""
+def test_unchanged_states_are_sent_at_every_second_tick(make: _Make) -> None:
+    """A changed state is sent at once, and a refusal only once."""
     bench = make()
     bench.send(25, command(7, _T0))
     bench.run(95)
@@ -310,7 +310,7 @@ def test_the_log_has_a_line_for_each_event(
 def test_outputs_that_are_not_ready_are_not_armed(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Meanwhile the guard stays alive, and later orders of the same round count."""
+    """The guard sends heartbeats while outputs get ready, and obeys later orders of the round."""
     bench = make(enable_pin=5)
     pin = bench.factory.pin(5)
 
@@ -332,7 +332,7 @@ def test_outputs_that_are_not_ready_are_not_armed(
 def test_a_failed_output_stops_all_until_rearmed(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Arming before the output recovered fails again, and the enable line is not fed meanwhile."""
+    """Until the output recovers, arming fails and the enable line is not toggled."""
     bench = make(enable_pin=5)
     bench.arms()
     pin, edges = bench.factory.pin(5), list[int]()
@@ -441,7 +441,7 @@ def _slow(make: _Make, takes_ms: Callable[[float], int]) -> tuple[_Bench, list[t
 
 @pytest.mark.parametrize("takes_ms", [0, 15])
 def test_no_stop_waits_for_a_sensor(make: _Make, takes_ms: int) -> None:
-    """The decision uses the time after the sensors were read."""
+    """The guard decides with the time after the sensors were read."""
     bench, driven = _slow(make, lambda _: takes_ms)
     bench.run(320)
     assert all(duty == 0.0 for t, duty in driven if t >= _T0 + 250 * MS)
@@ -599,7 +599,7 @@ def test_the_program_guards_until_a_signal(
     program.connect.assert_called_once_with("module:function", "argument")
     program.run_promptly.assert_called_once_with(GUARD)
     program.hardware.close.assert_called_once_with()
-    # Beats, and no end of the stream before the process exits.
+    # Heartbeats were sent, and the stream stays open until the process exits.
     assert program.supervisor.recv(1 << 16).startswith(b".")
     with pytest.raises(BlockingIOError):
         program.supervisor.recv(1)

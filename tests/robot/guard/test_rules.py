@@ -38,7 +38,7 @@ class _Armed:
         self.now_ns += round(ms * MS)
 
     def order(self, *values: float, age_ms: int = 0, frame_age_ms: int | None = None) -> str:
-        """Command, and return why that is refused."""
+        """Send a command, and return why it is refused."""
         self.seq += 1
         frame_ns = None if frame_age_ms is None else self.now_ns - frame_age_ms * MS
         issued_ns = self.now_ns - age_ms * MS
@@ -101,7 +101,7 @@ def test_a_command_ends_exactly_at_its_deadline() -> None:
 
 
 def test_an_emergency_stop_keeps_its_first_reason() -> None:
-    """A refusal to arm says why."""
+    """Refusals to move or to arm give the reason."""
     robot = _driving()
     rules = robot.rules
     for order in (Order("emergency", reason="a child."), Order("emergency"), Order("disarm")):
@@ -172,13 +172,13 @@ def test_a_tension_falls_no_faster_than_it_rises() -> None:
             seen.append(robot.tick().actions[0])
     assert max(abs(after - before) for before, after in pairwise(seen)) <= 0.2 + 1e-9
     assert sum(seen[20:]) / len(seen[20:]) == pytest.approx(0.5, abs=0.01)
-    for ms in (300, 40):  # Out of date, and then ramped to rest.
+    for ms in (300, 40):  # The command expires, then the tension ramps to rest.
         robot.wait(ms)
         robot.tick()
     assert robot.tick().actions == (0.0,)
 
 
-def test_three_levels() -> None:
+def test_an_action_with_three_levels_is_at_rest_or_at_a_cap() -> None:
     steering = ActionPlan("steering", -0.4, 0.4, slew_per_s=1.0, levels="three", threshold=0.3)
     robot = _Armed(replace(car(), actions=(steering,)))
     seen: list[float] = []
@@ -188,7 +188,7 @@ def test_three_levels() -> None:
     assert seen == [0.0, 0.4, 0.4, 0.0, -0.4, 0.0, 0.4]
 
 
-def test_a_stop_holds_and_ramps_what_does_not_propel() -> None:
+def test_a_stop_holds_and_ramps_actions_that_do_not_propel() -> None:
     robot = _driving(quick_car(stop=StopPlan(hold_ms=100, ramp_ms=200, then="release")))
     robot.rules.disarm("")
     assert robot.tick().actions == (0.5, 0.0)
@@ -312,7 +312,7 @@ def test_a_stall_ends_while_the_robot_stands() -> None:
     [(0.5, 0.5, (0.2, 0.0, 0.0)), (0.2, 0.2, (0.0,)), (0.5, 0.0, (0.0,))],
     ids=["it moves", "low throttle", "its controller is at neutral"],
 )
-def test_no_stall(throttle: float, done: float, speeds: tuple[float, ...]) -> None:
+def test_no_stall_is_detected(throttle: float, done: float, speeds: tuple[float, ...]) -> None:
     robot = _driving()
     for number in range(40):
         assert robot.ask(throttle) == (throttle, "")
@@ -322,7 +322,7 @@ def test_no_stall(throttle: float, done: float, speeds: tuple[float, ...]) -> No
     assert robot.sense() == {}
 
 
-def test_the_direction_is_that_of_the_propulsion() -> None:
+def test_the_direction_is_the_sign_of_the_propulsion() -> None:
     robot = _driving()
     for throttle, direction in ((0.5, 1.0), (0.0, 0.0), (-0.3, -1.0)):
         robot.ask(throttle)
@@ -359,7 +359,7 @@ _HEALTH = LimitPlan(low_battery_v=0.8, high_temperature_c=80.0)
 def test_a_low_battery_and_a_hot_computer_stop_after_half_a_second(
     limits: LimitPlan, name: str, value: float, reason: str
 ) -> None:
-    """Half a second without an interruption; a limit of 0 is not checked."""
+    """The limit must be exceeded without interruption; a limit of 0 is not checked."""
     robot = _driving(quick_car(limits))
     for at_ms, one in ((0, value), (400, 1.0), (450, value)):
         robot.now_ns = _T0 + at_ms * MS
@@ -373,7 +373,7 @@ def test_a_low_battery_and_a_hot_computer_stop_after_half_a_second(
 
 
 def test_a_low_battery_stops_until_it_is_full_and_armed_again() -> None:
-    """A computer that has cooled needs no arming."""
+    """A robot whose computer has cooled down need not be armed again."""
     robot = _driving(quick_car(_HEALTH))
     text = "The battery has 0.50 V, less than 0.8 V."
     for battery, arms, reason in ((0.5, 1, text), (0.8, 0, text), (0.8, 1, "")):
@@ -403,7 +403,7 @@ def test_a_low_battery_stops_until_it_is_full_and_armed_again() -> None:
     ],
 )
 def test_a_failed_protective_sensor_stops(name: str, limits: LimitPlan, stops: bool) -> None:
-    """A slow sensor stops whatever it measures, because it delays every stop."""
+    """A slow sensor stops the robot whatever it measures, because it delays every stop."""
     robot = _driving(quick_car(limits))
     text = f"Sensor {name} fails and cannot protect the robot: No answer."
     robot.rules.sense(Sensing(failures={name: "No answer."}), _T0)

@@ -96,7 +96,7 @@ class _World(RuleBasedStateMachine):
         ahead: int | None,
         is_good: bool,
     ) -> None:
-        """Offer any command; half are the next one, and half have enough values."""
+        """Offer any command; half have the next number, and half the right number of values."""
         if ahead is not None:
             session, seq = max(self.newest[0], 0), self.newest[1] + ahead
         if is_good:
@@ -136,7 +136,7 @@ class _World(RuleBasedStateMachine):
         person=st.booleans(),
     )
     def arm(self, age_ns: int, behind: int, person: bool) -> None:
-        """Arm, possibly without the last emergency count, or as a program."""
+        """Arm, possibly with another count of emergency stops, or as a program."""
         seen = max(0, self.emergencies - behind)
         order = Order("arm", issued_ns=self.now_ns - age_ns, emergency=seen, person=person)
         refusal = self.rules.offer(order, self.now_ns)

@@ -77,14 +77,14 @@ def _emit(lines: logging.Handler, text: str, *args: object) -> None:
 
 
 class _Unprintable:
-    """An argument whose text cannot be made."""
+    """An argument that cannot be converted to a string."""
 
     def __str__(self) -> str:
         raise RuntimeError
 
 
 def test_lines_are_dropped_cut_or_replaced_and_never_wait(pipe: tuple[int, int]) -> None:
-    """The next line says how many were lost, and the descriptor stays as it is."""
+    """The next line has the number of lost lines; the descriptor's flags do not change."""
     read, write = pipe
     flags = fcntl.fcntl(write, fcntl.F_GETFL)
     lines = _Lines(write)

@@ -1,4 +1,4 @@
-"""Sensors are read in turn, and of several of one kind the most cautious reading counts."""
+"""Sensors are read in turn; if several measure a quantity, the most cautious reading is used."""
 
 import itertools
 from dataclasses import replace
@@ -28,7 +28,7 @@ from tests.robot.guard.plans import quick_car
 def test_the_order_of_sensors_does_not_matter(
     name: str, values: tuple[float, float], counts: float
 ) -> None:
-    """Of equal readings the first counts, and of quantities without a caution the last."""
+    """Of equal readings the first is used, and of quantities without a rank the last."""
     for pair in itertools.permutations(zip(values, ("one", "two"), strict=True)):
         sensing = Sensing()
         for value, sensor in (*pair, (counts, "three")):
@@ -40,7 +40,7 @@ def test_the_order_of_sensors_does_not_matter(
 
 
 def test_no_sensor_hides_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each gets time and direction; one that fails, is slow or returns NaN is named."""
+    """Sensors that fail, are slow or return NaN are reported, and all others are read."""
     now_ns, asked = 0, list[tuple[float, ...]]()
 
     def chip(answer: Any, takes_ms: int = 0) -> Mock:

@@ -1,6 +1,6 @@
 """Pins rest when processes are killed, stopped or silent, with real processes and signals.
 
-The time limits are ten times those promised, because the test machine may be busy; `make bench`
+The time limits are ten times the promised ones, because the test machine may be busy; `make bench`
 measures the real times.
 """
 
@@ -71,10 +71,10 @@ def test_the_daemon_can_end_the_robot(tmp_path: Path) -> None:
         ("hardware", signal.SIGSTOP, 3_500),
     ],
 )
-def test_a_killed_or_stopped_process(
+def test_pins_rest_after_a_process_was_killed_or_stopped(
     tmp_path: Path, victim: str, number: signal.Signals, most_ms: int
 ) -> None:
-    """The guard rests the pins, or the supervisor for it; the restart does not clear the stop."""
+    """If the guard fails, the supervisor rests the pins; a restart does not clear the stop."""
     with running(tmp_path) as robot:
         robot.drive()
         guard, gone = robot.pids("hardware")[0], robot.pids(victim)[0]
@@ -112,7 +112,7 @@ def test_a_stuck_output_is_reported_as_unsafe(tmp_path: Path) -> None:
         robot.drive()
         stuck_ns = robot.record.lines()[-1]["t"]
         (tmp_path / "stuck-GPIO22").touch()
-        os.kill(robot.pids("daemon")[0], signal.SIGSTOP)  # At the deadline it must rest.
+        os.kill(robot.pids("daemon")[0], signal.SIGSTOP)  # At the deadline the pins must rest.
         until(lambda: "Emergency stop" in _log(tmp_path))
         pins = [line for line in robot.record.pins() if line["t"] > stuck_ns]
         assert [line["duty"] for line in pins if line["pin"] == "GPIO17"][-1] == 0.0
@@ -151,7 +151,7 @@ def test_a_stuck_output_at_the_start_ends_the_supervisor(tmp_path: Path) -> None
 
 
 def _child(name: str, polls: int) -> Mock:
-    """A child that was killed, and is gone after some polls: it is stuck in the kernel."""
+    """A killed child that is stuck in the kernel, and exits after some polls."""
     child = Mock(killed=True, has_beaten=True, code=None)
     child.name = name
 
@@ -187,7 +187,7 @@ def _stopped(guard: Mock, end_reason: str = "", **daemon: object) -> bool:
 
 @pytest.mark.parametrize("end_reason", ["", "ended by SIGTERM"])
 def test_a_guard_stuck_in_the_kernel_is_not_waited_for(safe: Mock, end_reason: str) -> None:
-    """The outputs are put to rest until it has ended, and they obeyed after that."""
+    """The outputs are put to rest repeatedly, and once more after the guard has exited."""
     guard, codes = _child("guard", 4), list[int | None]()
 
     def make_safe(*_: object) -> list[str]:
@@ -200,13 +200,13 @@ def test_a_guard_stuck_in_the_kernel_is_not_waited_for(safe: Mock, end_reason: s
 
 
 @pytest.mark.usefixtures("safe")
-def test_a_guard_that_never_exits_is_given_up() -> None:
+def test_the_supervisor_gives_up_on_a_guard_that_never_exits() -> None:
     assert not _stopped(_child("guard", 10**9), "ended by SIGTERM")
 
 
 @pytest.mark.usefixtures("safe")
 @pytest.mark.parametrize("name", ["ready.json", "folder"])
-def test_the_ready_file_goes_with_its_daemon(
+def test_the_ready_file_is_removed_when_its_daemon_ends(
     caplog: pytest.LogCaptureFixture, tmp_path: Path, name: str
 ) -> None:
     (tmp_path / "ready.json").write_text("{}")

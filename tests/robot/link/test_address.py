@@ -57,7 +57,7 @@ def test_any_text_is_an_address_or_an_error(text: str) -> None:
 
 
 def test_loopback_addresses() -> None:
-    """A server at all addresses is reached at the loopback."""
+    """A server that listens at all addresses is reached at the loopback address."""
     assert all(map(is_loopback, ("127.0.0.1", "127.9.9.9", "::1", "localhost")))
     assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.42.1", "car.local", "")))
     for host in ("", "0.0.0.0", "::"):

@@ -33,7 +33,7 @@ def test_a_proof_is_bound_to_all_its_inputs(
 
 
 def test_the_proof_of_the_protocol_does_not_change() -> None:
-    """Robots and clients of other versions compute it alone."""
+    """Robots and clients of other versions compute the same proof."""
     key, nonce, certificate = bytes(range(16)), bytes(32), b"c" * 32
     message = b"".join(
         len(part).to_bytes(4, "big") + part
@@ -84,7 +84,7 @@ def test_a_fingerprint_round_trips(certificate: bytes) -> None:
 
 
 def test_an_invalid_fingerprint_is_an_error() -> None:
-    """The short form has four groups of four characters."""
+    """A fingerprint has 64 hexadecimal digits; its short form has four groups of four letters."""
     short = fingerprint_short(fingerprint_of(b"certificate"))
     assert [len(group) for group in short.split("-")] == [4, 4, 4, 4]
     for text in ("", "ab" * 31, "ab" * 33, "zz" * 32):

@@ -81,7 +81,7 @@ def test_a_false_length_costs_no_memory(data: bytes) -> None:
         *(COMMAND | {"scale": scale} for scale in (1.01, float("nan"))),
         {"kind": "hello", "version": 1, "proof": b"", "role": "king"},
         {"kind": "hello", "version": 1, "proof": b"", "name": "x" * 65},
-        {"kind": "arm", "emergency": 0},  # It must answer an observation.
+        {"kind": "arm", "emergency": 0},  # `answers` is missing.
         {"kind": "observation", "seq": 1},
         {"kind": "dance"},
         {"seq": 1},
@@ -115,7 +115,7 @@ def test_bytes_are_not_in_the_repr() -> None:
     assert repr(hello).startswith("Hello(version=1, proof=<30 bytes>, name='', role='program'")
 
 
-def test_the_page_has_the_numbers_of_the_wire() -> None:
+def test_the_page_has_the_version_and_the_size_of_messages() -> None:
     page = (Path(__file__).parents[3] / "docs" / "wire.md").read_text()
     assert f"`version` ({messages.VERSION})" in page
     assert f"| size of a client's message | {messages.MAX_CLIENT_MESSAGE // 1024} KiB |" in page

@@ -48,7 +48,7 @@ def test_settings_are_plain_numbers_in_file_order() -> None:
 
 
 def test_layouts_are_in_newtons_metres_and_radians() -> None:
-    """Actions run from pretension at 0 to maximum at 1; states are of tendons, then of joints."""
+    """Actions are the pretension at 0 and the maximum at 1; states have tendons, then joints."""
     action = _PROFILE.action_layout()["FDP"]
     assert (action.low, action.high, action.gain, action.gain_unit) == (0.0, 1.0, 14.0, "N")
     assert _PROFILE.action_layout()["LUM"].gain == pytest.approx(5.4)
@@ -67,7 +67,7 @@ def test_layouts_are_in_newtons_metres_and_radians() -> None:
 
 
 def test_the_gain_of_an_action_is_in_the_unit_that_its_servo_controls() -> None:
-    """A length goes from the longest to the shortest; an action of two tendons has no unit."""
+    """An action of a length spans longest to shortest; an action of two tendons has no unit."""
     keys = 'id = 1\ncontrol = "length"\nlongest_m = 0.01\nshortest_m = -0.03\n'
     both = _TEXT.replace(_part("[action.FDS]", "[action.EIP]"), "")
     for text, gain, unit in (
@@ -79,7 +79,7 @@ def test_the_gain_of_an_action_is_in_the_unit_that_its_servo_controls() -> None:
 
 
 def test_a_feetech_rig_has_the_settings_of_its_power_switch() -> None:
-    """The plan has the time that the enable line holds, and the servos' start-up time."""
+    """The plan has the time until the enable line cuts the power, and the servos' boot time."""
     profile = read(finger_text("Feetech") + "hold_ms = 50\n")
     settings = {
         (o.settings["model"], o.settings["cut_ms"], o.settings["arm_s"]) for o in profile.outputs
@@ -97,7 +97,7 @@ def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
     assert "# Counts while the finger is straight." in path.read_text()
 
 
-# Text of the finger to replace where it is first, its replacement, and part of the message.
+# First occurrence to replace in the finger's profile, its replacement, and part of the message.
 _TABLE = r"""
 channel = 3\n -> channel = 2\n -> has the channel 2, which PIP_flexion has, too
 channel = 3\n -> channel = 8\n -> from 0 to 7
@@ -136,6 +136,6 @@ for _base, _rows in ((_TEXT, _TABLE), (finger_text("Feetech"), _FEETECH)):
 
 
 @pytest.mark.parametrize(("text", "message"), _MISTAKES, ids=[message for _, message in _MISTAKES])
-def test_mistake_is_named(text: str, message: str) -> None:
+def test_the_error_names_the_mistake(text: str, message: str) -> None:
     with pytest.raises(ProfileError, match=rf"line \d+: .*{re.escape(message)}"):
         read(text)

@@ -13,7 +13,7 @@ from tests.robot.profile.texts import EVERYTHING
 
 
 def test_names_and_paths() -> None:
-    """Names of shipped profiles resolve to their files; everything else is a path."""
+    """Names of shipped profiles resolve to their files; any other argument is a path."""
     assert find_profile("car") == shipped_profiles()["car"]
     assert find_profile("car.toml") == Path("car.toml")
     assert find_profile("robots/car") == Path("robots/car")
@@ -83,7 +83,7 @@ def rover(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("kind", shipped_profiles())
-def test_a_first_profile_differs_only_in_its_name(kind: str, tmp_path: Path) -> None:
+def test_a_new_profile_differs_only_in_its_name(kind: str, tmp_path: Path) -> None:
     """All other lines equal the shipped file's, including comments."""
     path = write_profile(kind, tmp_path / "new" / "my.toml", 'Ann\'s "7" \\ ü')
     profile = load_profile(path)
@@ -97,7 +97,7 @@ def test_a_first_profile_differs_only_in_its_name(kind: str, tmp_path: Path) -> 
     assert len(differing) == 1
 
 
-def test_a_first_profile_overwrites_nothing(tmp_path: Path) -> None:
+def test_a_new_profile_overwrites_no_file(tmp_path: Path) -> None:
     path = tmp_path / "car.toml"
     path.write_text("mine")
     new = tmp_path / "new.toml"
@@ -183,8 +183,8 @@ def test_a_change_that_breaks_the_profile_is_refused(
 
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("kind", ["car", "lab-car", "finger"])
-def test_a_first_profile_takes_another_camera(kind: str, camera: str, tmp_path: Path) -> None:
-    """Size and rate stay; what belongs to the other camera goes."""
+def test_a_new_profile_can_have_another_camera(kind: str, camera: str, tmp_path: Path) -> None:
+    """Size and rate are kept; settings of the shipped camera are removed."""
     before = load_profile(shipped_profiles()[kind])
     profile = load_profile(write_profile(kind, tmp_path / "mine.toml", "mine", camera, "anyone"))
     assert profile.arming == "anyone"

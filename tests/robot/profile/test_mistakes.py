@@ -68,7 +68,7 @@ deadline_ms = 200 -> deadline_ms = 1001 -> from 20 to 1000, not 1001
 deadline_ms = 200 -> deadline_ms = 39 -> must be at least 40 ms, the time from one command
 deadline_ms = 200 -> camera_stale_ms = 0 -> must be at least 100 ms
 flip = true -> fps = 3 -> camera_stale_ms of [limits] must be at least 667 ms -> [limits]
-throttle = -0.4 -> throttle = -0.6 -> must have -0.5 to 1 for throttle
+throttle = -0.4 -> throttle = -0.6 -> must be -0.5 to 1 for throttle
 throttle = -0.4 -> thrott = -0.4 -> no action: 'thrott' (did you mean
 arm = 0.5\n -> arm = 2\n -> [[reset]] number 2 must be a table of numbers -> [reset.values]
 hold_ms = 50 -> hold_ms = 10 -> must be a whole number from 30 to 1000
@@ -114,7 +114,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake[1][:40])
-def test_mistake_is_named(mistake: tuple[str, ...]) -> None:
+def test_the_error_names_line_and_mistake(mistake: tuple[str, ...]) -> None:
     old, new, message, *part = mistake
     text = changed(old, new)
     with pytest.raises(ProfileError) as caught:
@@ -169,7 +169,7 @@ def test_texts_without_the_tables_are_refused(text: str, message: str) -> None:
 
 
 @pytest.mark.parametrize("key", ["hold_ms", "ramp_ms"])
-def test_a_stop_may_not_let_the_robot_drive_on(key: str) -> None:
+def test_a_stop_must_not_keep_the_robot_driving(key: str) -> None:
     """A stop must not hold a propelling output, such as a track that mixes in steering."""
     tank = shipped_profiles()["tank"].read_text() + f"\n[stop]\n{key} = 100\n"
     read(tank)
@@ -178,5 +178,5 @@ def test_a_stop_may_not_let_the_robot_drive_on(key: str) -> None:
 
 
 def test_a_key_without_a_description_names_its_type() -> None:
-    """A chip of another package may declare such keys."""
+    """A chip of another package may declare a key without a description."""
     assert permitted(inspect.type_info(list[int])) == "a list"

@@ -1,4 +1,4 @@
-"""What guard, daemon and workstation read from a profile, and the lines of its keys."""
+"""Values that guard, daemon and workstation read from a profile, and the lines of its keys."""
 
 import datetime
 import math
@@ -51,14 +51,14 @@ def test_everything_is_read() -> None:
 
 
 def test_a_profile_may_state_how_the_robot_turns() -> None:
-    """In degrees there, and in rad for programs; one of the two numbers suffices."""
+    """Profiles state the turn in degrees, programs get rad; one of the two numbers suffices."""
     assert read().turning is None
     stated = read(changed("control_hz = 25", "control_hz = 25\nturn_deg_per_m = 90"))
     assert stated.turning == pytest.approx((0.5 * math.pi, 0.0))
 
 
-def test_drivers_find_all_their_settings() -> None:
-    """Each driver gets all of its keys, and pins as BCM numbers."""
+def test_outputs_and_sensors_have_all_settings_of_their_drivers() -> None:
+    """Settings have the default of each missing key, and pins as BCM numbers."""
     settings = {output.name: output.settings for output in read().outputs}
     assert settings["drive"] == {
         "forward": 22, "backward": 27, "enable": 26, "pwm_hz": 50, "start": 0.0, "full": 1.0,
@@ -147,7 +147,7 @@ def test_the_header_matches_gpiozero() -> None:
     assert named == BCM_OF_BOARD
 
 
-def test_the_pins_of_2017() -> None:
+def test_the_pins_of_the_original_release_are_parsed() -> None:
     assert [bcm(f"BOARD{n}") for n in (15, 13, 11, 7)] == [22, 27, 17, 4]
     assert bcm("GPIO22") == bcm(22) == 22
 

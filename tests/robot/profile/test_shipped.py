@@ -51,7 +51,7 @@ def test_tracks_and_twin_propellers_mix(steering: float, throttle: float) -> Non
 
 
 @given(steering=SIDE, throttle=SIDE)
-def test_cars_and_boats_keep_the_sign(steering: float, throttle: float) -> None:
+def test_outputs_of_cars_and_boats_keep_the_sign(steering: float, throttle: float) -> None:
     """-1 is left and backward, 1 right and forward, on every output."""
     for name, drive, steer in (
         ("car", "drive", "steer"),
@@ -68,8 +68,8 @@ def test_cars_and_boats_keep_the_sign(steering: float, throttle: float) -> None:
         assert abs(outputs[drive]) <= abs(throttle)
 
 
-def test_power_and_posture_of_2017() -> None:
-    """Caps of the car are 60 % on the drive and 40 % on the steering; a cat rests as then."""
+def test_power_and_posture_equal_the_original_release() -> None:
+    """The car drives with 60 % and steers with 40 %; the cat rests in its posture of 2017."""
     for side in (1.0, -1.0):
         assert values(PLANS["car"], [side, side]) == {"drive": 0.6 * side, "steer": 0.4 * side}
     degrees = [85.0 + action.gain * action.rest for action in PLANS["cat"].actions]
@@ -79,13 +79,13 @@ def test_power_and_posture_of_2017() -> None:
 
 @given(pull=st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))
 def test_tendons_pull_one_to_one(pull: list[float]) -> None:
-    """Slack and taut are the two ends of a servo, and each tendon has its own servo."""
+    """Each tendon has a servo, which is at its two ends when the tendon is slack and taut."""
     outputs = values(PLANS["finger-pwm"], pull)
     assert list(outputs) == ["EIP", "DI", "PI", "FDP", "FDS", "LUM", "EDC"]
     assert list(outputs.values()) == pytest.approx([2.0 * p - 1.0 for p in pull])
 
 
-def test_a_vehicle_defined_by_its_profile_alone() -> None:
+def test_a_profile_alone_can_define_a_vehicle() -> None:
     profile = read(HOVERCRAFT)
     plan = profile.guard_plan()
     assert profile.action_layout().names == ("steering", "throttle", "lift")

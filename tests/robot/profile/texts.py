@@ -133,7 +133,7 @@ pin = 21
 
 _DOCS: Final = Path(__file__).parents[3] / "docs"
 
-# The vehicle of the guide, with a rudder that turns less than the other.
+# The vehicle of the guide; its right rudder turns less than the left one.
 (HOVERCRAFT,) = re.findall(
     r"```toml\n(\[robot\].*?)```", (_DOCS / "profiles.md").read_text(), re.DOTALL
 )
@@ -142,7 +142,7 @@ HOVERCRAFT = "steering = 0.8".join(HOVERCRAFT.rsplit("steering = 1.0", 1))
 
 
 def changed(old: str, new: str, text: str = EVERYTHING) -> str:
-    """Return a text with its only `old` replaced; `new` is appended where `old` is empty."""
+    """Return a text with its only `old` replaced; if `old` is empty, `new` is appended."""
     if not old:
         return text + new
     assert text.count(old) == 1, old
@@ -160,7 +160,7 @@ def finger_text(family: str) -> str:
     """Return the shipped finger with control of the lengths.
 
     Args:
-        family: "Dynamixel", or "Feetech" with the lines that differ, as the guide has them.
+        family: "Dynamixel", or "Feetech" with the lines of the guide that differ.
     """
     text = shipped_profiles()["finger"].read_text()
     lines, enable = _LENGTH, ""

@@ -10,12 +10,12 @@ class FakePi:
 
     Args:
         root: Folder for its files.
-        config: Content of its config.txt; None for none.
-        groups: Its groups, none with members.
+        config: Content of its config.txt; None for no such file.
+        groups: Its groups, which have no members.
 
     Attributes:
         ran: The commands so far, as typed.
-        refuses: Program that fails.
+        refuses: Name of a program whose commands fail.
     """
 
     def __init__(

@@ -26,7 +26,7 @@ _MOTOR = OutputPlan("drive", "hbridge", mix={"throttle": 0.6}, settings={"full":
 
 @pytest.mark.parametrize(("left_us", "right_us"), [(1100, 1900), (1900, 1100)])
 def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
-    """Works for reversed servos too."""
+    """Reversed servos keep their larger width on the left."""
     narrow = {"over": "lgpio", "left_us": left_us, "right_us": right_us}
     servo = OutputPlan("steer", "servo", settings=narrow)
     wide = replace(servo, settings=narrow | widest_pulses(servo))
@@ -53,7 +53,7 @@ def test_impossible_measurements_are_refused() -> None:
             wheel_changes("wheel", 0.21, measured_m)
 
 
-def test_motors_and_wheels_change_what_was_measured() -> None:
+def test_motors_and_wheels_get_the_measured_settings() -> None:
     """A motor that turned backward gets a negative mix; 0.5 m for 1 m doubles a wheel's turn."""
     assert motor_changes(_MOTOR, "forward", 0.214) == {"output.drive.start": 0.21}
     assert motor_changes(_MOTOR, "backward", 0.2)["output.drive.mix"] == {"throttle": -0.6}

@@ -1,4 +1,4 @@
-"""Putting a robot in place on a Raspberry Pi, on a fake one."""
+"""Installation of a robot on a fake Raspberry Pi."""
 
 import sys
 from dataclasses import replace
@@ -43,10 +43,10 @@ def pi(tmp_path: Path) -> FakePi:
     return FakePi(tmp_path)
 
 
-def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
+def test_the_checks_are_good_after_an_installation(pi: FakePi) -> None:
     """`install` corrects the settings of the computer that the checks find bad.
 
-    A line below a filter, such as [pi5], applies to that model only; ours applies to all.
+    A line below a filter, such as [pi5], applies to one model; the added line applies to all.
     """
     pi.write("boot/firmware/config.txt", "[pi5]\ndtparam=strict_gpiod\n")
     profile = replace(_blind("car"), path=pi.root / "my home" / "car.toml")
@@ -67,10 +67,10 @@ def test_a_servo_board_and_a_rig_need_i2c(pi: FakePi) -> None:
     assert set(_levels(_install(pi, _blind("finger"))).values()) == {"already"}
 
 
-def test_what_fails_is_told_with_its_command(
+def test_a_failed_change_is_reported_with_its_command(
     pi: FakePi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An exit code of 0 is not proof, and what Raspberry Pi OS would have is named."""
+    """A command with exit code 0 but no effect has failed; missing parts of the OS are named."""
     pi.refuses = "usermod"
     found = _install(pi, _blind("car"))
     sentence = "usermod: permission denied. By hand: sudo usermod -aG gpio pi"
@@ -86,7 +86,7 @@ def test_what_fails_is_told_with_its_command(
 
 
 def test_the_service_is_removed(pi: FakePi) -> None:
-    """An older one is replaced; once removed, nothing of it is left. A dry run names commands."""
+    """An older unit is replaced; removing it leaves no file. A dry run reports commands."""
     pi.write(_UNIT, "old")
     found = _install(pi, shipped("car"), dry=True)
     assert found["group gpio"] == ("would", "sudo usermod -aG gpio pi")
@@ -101,7 +101,7 @@ def test_the_service_is_removed(pi: FakePi) -> None:
 
 
 def test_commands_run_as_root(pi: FakePi, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without root, commands use sudo; a failure is its last line; only a Pi is accepted."""
+    """Without root, commands use sudo; a failure returns its last line; only a Pi is accepted."""
     code = "import sys; sys.stderr.write('one\\ntwo\\n'); sys.exit(len(sys.stdin.read()))"
     script = RootCommand((sys.executable, "-c", code), "text")
     monkeypatch.setattr("os.geteuid", lambda: 0)
@@ -121,7 +121,7 @@ def test_commands_run_as_root(pi: FakePi, monkeypatch: pytest.MonkeyPatch) -> No
 def test_the_unit_names_profile_program_and_user(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All placeholders are replaced, and what systemd would split or expand is quoted."""
+    """Placeholders are replaced, and characters that systemd would split or expand are quoted."""
     monkeypatch.setattr("shutil.which", lambda _: "/opt/venv/bin/shapechanger")
     profile = tmp_path / "@USER@ 1" / 'a\nUser=$1 100% "b\\c".toml'
     path, is_new = write_unit("my car", profile, tmp_path, "pi")

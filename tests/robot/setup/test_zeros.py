@@ -54,7 +54,7 @@ def test_zeros_are_the_counts_of_straight_joints(tremble: float) -> None:
 
 
 def test_a_missing_magnet_or_a_loose_tendon_is_an_error() -> None:
-    """The error names it, and all servos are released; a car has neither."""
+    """The error names the joint or tendon, and all servos are released; a car has neither."""
     board = _board()
     board.pins.of_kind(SimulatedJoints)[0].set_magnet("DIP_flexion", "gone")
     with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):

@@ -237,7 +237,7 @@ def _reset(root: Table, actions: Sequence[ActionPlan]) -> Iterator[ResetStep]:
                 raise table.refused("values", f"names no action: {choice(name, named)}", name)
             low, high = named[name].low, named[name].high
             if not low <= value <= high:
-                text = f"must have {low:g} to {high:g} for {name}, its own caps"
+                text = f"must be {low:g} to {high:g} for {name}, the caps of this action"
                 raise table.refused("values", text, name)
         filled = tuple(step.values.get(action.name, action.rest) for action in actions)
         yield ResetStep(filled, step.seconds)

@@ -1,4 +1,4 @@
-"""The scene of an attack: a served twin, armed and at rest, and what judges a movement."""
+"""The scene of an attack: a served twin, armed and at rest, and helpers to detect movements."""
 
 import contextlib
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.client.attacks.stranger import Stranger, key_bytes
 
 FULL = (1.0, 1.0)
-"""What every attacker wants the outputs to do."""
+"""Actions that every attacker commands."""
 
 CAP = 0.6
 """Largest duty of the motor that the profile allows."""
@@ -50,7 +50,7 @@ def movements(robot: RunningRobot) -> int:
 
 
 def settle(robot: RunningRobot, key: bytes, wait_ns: int = 50_000_000) -> None:
-    """Let an honest client see a state of the guard `wait_ns` later than all that was sent."""
+    """Wait until the guard reports a state `wait_ns` later than now to an honest client."""
     with Stranger(robot.port) as honest:
         honest.enter(key, "person", name="honest")
         now_ns = honest.now_ns()

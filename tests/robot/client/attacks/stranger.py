@@ -1,6 +1,6 @@
 """A client written from docs/wire.md alone: sockets, TLS, WebSocket frames and plain msgpack.
 
-It shares no code with Shapechanger, so that it can also send what a right client never would.
+It shares no code with Shapechanger, so that it can also send invalid messages.
 """
 
 import base64
@@ -89,7 +89,7 @@ class Stranger:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the connection without a word."""
+        """Close the connection without a closing handshake."""
         self._socket.close()
 
     # Bytes.
@@ -107,7 +107,7 @@ class Stranger:
         return data
 
     def rest(self) -> str:
-        """Return all that follows until the robot closes the connection."""
+        """Return all data until the robot closes the connection."""
         while data := self._some():
             self._received += data
         return self._received.decode("latin-1")
@@ -224,7 +224,7 @@ class Stranger:
         return self.expect("lease")
 
     def arm(self) -> None:
-        """Ask to arm until it is done; a busy guard may say so late."""
+        """Arm the robot and wait until it is armed, which a busy guard may report late."""
         seen = self.observe()
         self.send("arm", answers=seen["seq"], emergency=seen["emergencies"])
         while not seen["armed"]:
@@ -234,7 +234,7 @@ class Stranger:
         """Enter as a person, take control once it is free, and arm."""
         self.enter(key, "person", name=name)
         while not self.take()["mine"]:
-            pass  # The client of the test before may still be leaving.
+            pass  # The client of the previous test may still have control.
         self.arm()
 
     def drive(self, seq: int, *values: float, **fields: Any) -> None:

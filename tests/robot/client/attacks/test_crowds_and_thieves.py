@@ -1,4 +1,4 @@
-"""Attackers that hold all connections, and thieves of the key: what they can do and cannot."""
+"""Attackers that occupy all connections, and thieves of the key."""
 
 import base64
 import itertools
@@ -19,7 +19,7 @@ DRIVE_PINS = (22, 27)
 ELSEWHERE = [f"127.0.0.{number}" for number in range(2, 8)]  # Addresses of attackers.
 
 
-# Many at once. The limits before a hello are 16 connections per address and 48 in all.
+# Many connections at once; before a hello, 16 per address and 48 in all are permitted.
 
 
 def knocks(scene: Scene, source: str) -> Stranger:
@@ -47,7 +47,7 @@ def half_a_hello(scene: Scene, source: str) -> Stranger:
 
 
 def thief_without_a_word(scene: Scene, source: str) -> Stranger:
-    """Connect as a person with the key, and read nothing from then on."""
+    """Connect as a person with the key, without reading any message afterwards."""
     stranger = scene.stranger(source=source)
     stranger.hello(scene.key, "person", name="thief")
     return stranger
@@ -57,7 +57,7 @@ HOLDS = (knocks, says_nothing, half_a_hello, thief_without_a_word)
 
 
 @pytest.mark.parametrize("hold", HOLDS, ids=lambda hold: hold.__name__)
-def test_a_person_stops_the_robot_whoever_holds_its_connections(
+def test_a_person_can_stop_a_robot_whose_connections_are_occupied(
     scene: Scene, hold: Callable[[Scene, str], Stranger]
 ) -> None:
     count = 9 if "thief" in hold.__name__ else 54
@@ -83,7 +83,7 @@ def test_a_slow_connection_ends_however_many_bytes_it_sends(
         slow = [stranger for stranger in slow if stranger.is_open()]
 
 
-# What a thief of the key can do, and cannot.
+# Thieves of the key.
 
 
 def test_a_thief_of_the_key_stays_within_the_limits_of_the_guard(robot: RunningRobot) -> None:

@@ -1,4 +1,4 @@
-"""Attacks that a served robot refuses without a movement, each by its name."""
+"""Attacks that a served robot refuses without a movement, keyed by name."""
 
 import ssl
 from collections.abc import Callable
@@ -16,7 +16,7 @@ ATTACKS: dict[str, tuple[Attack, str]] = {}
 
 
 def refused(text: str) -> Callable[[Attack], Attack]:
-    """Register an attack that must return a text with `words`."""
+    """Register an attack; the refusal that it returns must contain `text`."""
 
     def register(attack: Attack) -> Attack:
         ATTACKS[attack.__name__] = attack, text
@@ -26,7 +26,7 @@ def refused(text: str) -> Callable[[Attack], Attack]:
 
 
 def passed_on(scene: Scene, made_as: str, certificate: bytes | None = None) -> Stranger:
-    """Say hello as a person with a proof that an honest client has made otherwise."""
+    """Say hello as a person, with a proof for another role or another certificate."""
     stranger = scene.stranger()
     seen = stranger.certificate if certificate is None else certificate
     made = proof(scene.key, stranger.challenge(), seen, made_as)
@@ -61,7 +61,7 @@ def replayed_hello(scene: Scene) -> str:
 
 
 def before_hello(scene: Scene, kind: str, **fields: Any) -> str:
-    """Order without a hello: only clients with the key may even stop the robot."""
+    """Send a request before a hello; clients without the key cannot even stop the robot."""
     stranger = scene.stranger()
     stranger.challenge()
     stranger.send(kind, **fields)
@@ -175,7 +175,7 @@ ATTACKS |= {
 
 @refused("sent already")
 def second_hello(scene: Scene) -> str:
-    """Change the role after the introduction."""
+    """Send a second hello with another role."""
     thief = scene.inside()
     known = proof(scene.key, thief.nonce, thief.certificate, "person")
     thief.send("hello", version=1, proof=known, role="person")

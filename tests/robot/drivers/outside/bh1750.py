@@ -14,7 +14,7 @@ from shapechanger.robot.hardware import Hardware
 _MEASURE = 0x10  # Continuously, in steps of 1/1.2 lx.
 _COUNTS_PER_LUX = 1.2
 LUX = 240.0
-"""Light in the twin's world, which has no sun."""
+"""Illuminance in the twin's world, lx."""
 
 
 class Bh1750Keys(I2cKeys, frozen=True, kw_only=True):
@@ -38,7 +38,7 @@ class SimulatedBh1750(SimulatedChip):
     """A BH1750 in constant light."""
 
     def __init__(self, world: World) -> None:
-        """Take no notice of the world."""
+        """Ignore the world."""
 
     def read(self, register: int, length: int) -> list[int]:
         return list(round(LUX * _COUNTS_PER_LUX).to_bytes(length, "big"))

@@ -60,8 +60,8 @@ def of(family: str, **changes: Any) -> BusSettings:
 class FaultyPort(SerialServoPort):
     """A port of the SDK at a simulated bus, without real time.
 
-    An answer that is late or missing counts as timed out as soon as the SDK asks. Every use of a
-    device that `is_gone` raises OSError.
+    An answer that is late or missing has timed out as soon as the SDK checks the timeout. If
+    `is_gone`, every use of the device raises OSError.
     """
 
     def __init__(self, settings: BusSettings, line: Line) -> None:
@@ -70,8 +70,8 @@ class FaultyPort(SerialServoPort):
         self._arrived = bytearray()
         self._late: list[tuple[int, bytes]] = []
         self.is_gone = self.is_closed = False
-        self.late_ns: dict[int, int] = {}  # By id, as are the damaged ones.
-        self.damaged: set[int] = set()
+        self.late_ns: dict[int, int] = {}  # Delay of the answers of servos, keyed by id.
+        self.damaged: set[int] = set()  # Ids of servos whose answers are damaged.
         self.sent: list[bytes] = []
         self.received = 0
 
@@ -119,7 +119,7 @@ class FaultyPort(SerialServoPort):
 
 
 def line(*servos: ServoSettings) -> Line:
-    """Return a simulated bus with these servos; a Dynamixel without any."""
+    """Return a simulated bus with these servos; by default with one Dynamixel servo."""
     return Line(settings(servos=servos or (servo("FDP"),)))
 
 
@@ -129,7 +129,7 @@ class Rig(FakeHardware):
     def __init__(self, bus: BusSettings | None = None) -> None:
         super().__init__()
         self.settings = settings() if bus is None else bus
-        # Anywhere: each servo is some turns away from its position 0.
+        # The servos start at various positions, some turns away from 0.
         self.line = line(*(replace(one, zero=1304 * one.id) for one in self.settings.servos))
         self.port = FaultyPort(self.settings, self.line)
         self.bus = ServoBus(self.settings, self)

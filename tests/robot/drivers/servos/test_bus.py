@@ -8,7 +8,7 @@ from tests.robot.drivers.servos.rigs import NAMES, Rig, of, servo, settings
 
 @pytest.mark.parametrize("family", ["Dynamixel", "Feetech"])
 def test_another_servo_than_in_the_settings_is_refused(family: str) -> None:
-    """All missing servos are named, and one of another model, whose torque constant differs."""
+    """The error names all missing servos, or a servo of another model."""
     rig = Rig(of(family))
     rig.twin("FDS").mute = rig.twin("PI").deaf = True
     text = r"no servo answers as FDS \(id 2\), PI \(id 7\); those that do: FDP \(id 1\), EIP"
@@ -64,9 +64,9 @@ def test_setup_configures_servos_without_torque(family: str, expected: str) -> N
 def test_a_setting_that_is_not_kept_is_an_error(
     family: str, register: int, data: bytes, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A Feetech servo does not say that it refuses, so what it has is read again.
+    """A Feetech servo does not report refusals, so its registers are read back; a Dynamixel does.
 
-    A Dynamixel says why, and the torque of all servos is off again.
+    The torque of all servos is off again.
     """
     rig = Rig(of(family))
     servo = rig.twin("EDC")
@@ -79,7 +79,7 @@ def test_a_setting_that_is_not_kept_is_an_error(
     assert not any(one.has_torque for one in rig.line.servos.values())
 
 
-def test_torque_is_enabled_last_and_the_eeprom_spared() -> None:
+def test_torque_is_enabled_last_and_eeprom_writes_are_avoided() -> None:
     """`hold` writes goal and watchdog before torque; a second setup writes no EEPROM register."""
     rig = Rig()
     rig.bus.set_up()
@@ -121,7 +121,7 @@ def test_a_stop_ramps_down_and_releases() -> None:
 
 @pytest.mark.parametrize(("ramp_ms", "pulled"), [(0, True), (300, False)])
 def test_a_stop_pulls_no_slack_tendon(ramp_ms: int, pulled: bool) -> None:
-    """Without a ramp the servos let go at once; a stop before the first pull does not pull."""
+    """Without a ramp the servos release at once; a stop before the first pull does not pull."""
     rig = Rig(settings(ramp_ms=ramp_ms)).start()
     if pulled:
         rig.run(12.0, 5)
@@ -202,7 +202,7 @@ def test_the_tension_of_a_blocked_tendon_is_limited() -> None:
     rig = _rig()
     rig.run(8.0, 300, length=-0.03)
     assert rig.twin("EDC").motor.current == pytest.approx(8.0 / 29.3, rel=0.01)
-    assert rig.twin("EDC").motor.tension < 8.0 + 1.05  # And the friction of the gears.
+    assert rig.twin("EDC").motor.tension < 8.0 + 1.05  # 1.05 N is the friction of the gears.
 
 
 def test_a_length_without_a_zero_is_refused() -> None:

@@ -30,7 +30,7 @@ def _set(attribute: str, value: float) -> _Fault:
     return fault
 
 
-# Without load a Feetech servo with a low limit is slow, so its speed does not show this.
+# Only for Dynamixel: a Feetech servo with a low limit is slow even without load.
 _SNAPPED = (_breaks("snapped"), "has lost its tendon: it winds in at")
 _FAULTS: list[tuple[_Fault, str]] = [
     (_set("temperature", 68.0), "has 68 C, more than 65 C"),
@@ -84,9 +84,9 @@ def test_a_fault_of_one_servo_stops_all(family: str, fault: _Fault, text: str) -
 
 
 def test_a_short_silence_is_tolerated() -> None:
-    """The others are read in a second packet; a plug that recovers causes no stop.
+    """Servos behind a silent one are read in a second packet; a short loss causes no stop.
 
-    Each retry waits for a timeout, during which the guard cannot stop anything.
+    There are few retries, because the guard cannot stop the robot during a timeout.
     """
     rig = Rig().start()
     rig.run(4.0, 3)
@@ -199,7 +199,7 @@ def test_an_unplugged_adapter_is_reported_and_trips_the_watchdogs() -> None:
         (64, "Servo PI (id 7) has let go by itself."),
     ],
 )
-def test_what_was_not_applied_is_reported(
+def test_a_goal_or_torque_that_is_not_in_effect_is_reported(
     deaf_for: int, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Sync writes have no reply, so the driver reads goals and torque back periodically."""
@@ -243,7 +243,7 @@ _slow = examples(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 def test_noise_never_breaks_the_driver_or_its_caps(
     family: str, noise: list[bytes], tension: float
 ) -> None:
-    """Setting up succeeds or raises a whole sentence, and no servo pulls more than its cap."""
+    """`set_up` succeeds or raises a full sentence, and no servo pulls more than its cap."""
     rig, errors = Rig(of(family)), list[str]()
     for data in noise[:2]:
         rig.port.inject(data)

@@ -26,7 +26,7 @@ _PATIENT_MS = 20_000.0
 class ServoPty:
     """Serve a simulated bus at a pseudo-terminal from a thread.
 
-    A packet without an answer, such as a sync write, has certainly arrived once a later one was
+    A packet without an answer, such as a sync write, has certainly arrived once a later packet was
     answered, so read an answer before advancing the time of the bus.
     """
 

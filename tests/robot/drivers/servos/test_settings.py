@@ -43,7 +43,7 @@ from tests.robot.drivers.servos.wire import DYNAMIXEL, FEETECH
         (feetech, {"most_tension_n": 400.0}, "must be 0.38 to 382 N with this spool"),
     ],
 )
-def test_what_a_servo_cannot_do_is_refused(
+def test_settings_that_a_servo_does_not_support_are_refused(
     make: Callable[..., object], changes: dict[str, Any], text: str
 ) -> None:
     with pytest.raises(KeyMistake, match=text) as caught:
@@ -63,14 +63,14 @@ def test_what_a_servo_cannot_do_is_refused(
         ({"servos": (feetech("FDP"),), "baud": 4_000_000}, "baud", "38400.*, not 4000000"),
     ],
 )
-def test_what_a_bus_cannot_do_is_refused(changes: dict[str, Any], key: str, text: str) -> None:
+def test_invalid_bus_settings_are_refused(changes: dict[str, Any], key: str, text: str) -> None:
     with pytest.raises(KeyMistake, match=text) as caught:
         settings(**changes)
     assert caught.value.key == key
 
 
 def test_the_table_is_complete() -> None:
-    """A profile takes the names of `servos.toml`, and every family has the registers in use."""
+    """`ModelName` has all names of `servos.toml`, and both families have all registers in use."""
     assert get_args(ModelName) == tuple(MODELS)
     own = [name for name, one in DYNAMIXEL.registers.items() if one.value is None]
     assert set(own) <= set(FEETECH.registers)
@@ -165,7 +165,7 @@ def test_present_values_are_signed() -> None:
 
 
 def _see(one: TendonServo, mm_per_s: float, now_ms: int, length_mm: float = 0.0) -> str:
-    """Return the fault after a cycle in which a tendon has a length and gets longer."""
+    """Return the fault after a cycle with this length and this rate of lengthening."""
     speed = round(-mm_per_s / 5 / DYNAMIXEL.rad_per_s)
     position = round(length_mm * -4096 / (2 * math.pi * 5))
     data = b"\0\0" + speed.to_bytes(4, "little", signed=True)
@@ -175,9 +175,9 @@ def _see(one: TendonServo, mm_per_s: float, now_ms: int, length_mm: float = 0.0)
 
 
 def test_a_slack_tendon_is_found() -> None:
-    """70 % of the speed without load are 140 mm/s; a short flick of the finger is no snap.
+    """A tendon is slack after 100 ms above 140 mm/s, 70 % of the speed without load.
 
-    A tendon shorter than the finger allows is slack at once.
+    A tendon that is wound in further than the finger allows is slack at once.
     """
     one = _one(servo("FDP"))
     speeds = [(500, 0), (-150, 0), (-150, 99), (-130, 100), (-150, 110), (-150, 209)]
