@@ -102,7 +102,7 @@ FALSE = b"false,false"
         (False, _link_away, "leaves the folder"),
         (True, _table(b"000001.jpg", b"../1.jpg"), "leaves the folder"),
         (True, _table(FALSE + b",,,\n4", b"maybe,false,,,\n4"), "`bool`, got `str`"),
-        (True, _table(FALSE + b",,,\n4", b",false,,,\n4"), "line 5 of out-v0: terminated is empty"),
+        (True, _table(FALSE + b",,,\n4", b",false,,,\n4"), "line 5 of out-v0: it is invalid"),
         (True, _table(b"\n3,", b"\n2,"), "step 2 is not after the step before"),
         (True, _table(b"\n3,", b"\n3,x\n3.5,"), "2 cells instead of"),
         (

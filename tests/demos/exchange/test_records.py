@@ -19,6 +19,7 @@ from shapechanger.demos.exchange.base import drives, whole_records
 from shapechanger.demos.exchange.files import load_jpeg
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError
+from shapechanger.layout import Layout
 from tests.demos.exchange.small import findings_of, header, huge, image_file, picture
 
 GOOD = [picture(n) for n in range(4)]
@@ -72,7 +73,7 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
         )
         for n, (data, finite, fine) in enumerate(shown)
     ]
-    episode = ExchangeEpisode(header=header(), records=records, name="it")
+    episode = ExchangeEpisode(header=header(state_layout=Layout(())), records=records, name="it")
     kept = [(int(one.step.action[1]), one.jpeg) for one in whole_records(episode, context)]
     good = [n for n, (data, *fine) in enumerate(shown) if data in GOOD and all(fine)]
     assert kept == [(n, shown[n][0]) for n in good]

@@ -133,19 +133,12 @@ def export_recording(
         raise UnknownName("format", format, [n for n, one in formats().items() if one.write])
     _require_options(form, dropped=dropped, task=task, images=images)
     read = [read_episode(path) for path in episodes_of(data)]
-    chosen = [(episode, episode.steps if dropped else episode.kept) for episode in read]
-    if not any(steps for _, steps in chosen):
+    chosen = [(one, one.steps if dropped else one.kept, one.outcome) for one in read]
+    if not any(steps for _, steps, _ in chosen):
         raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
     notes: list[str] = []
-    if form.consecutive:
-        episodes = _consecutive(chosen, form, notes)
-    else:
-        episodes = [_exchanged(episode, steps, episode.outcome) for episode, steps in chosen]
-    for episode in episodes:
-        for name in form.common:
-            if getattr(episode.header, name) != getattr(episodes[0].header, name):
-                text = f"{episode.name} differs from {episodes[0].name} in its {name}"
-                raise DemosError(f"{text}: export each kind to its own {form.title} dataset.")
+    split = _consecutive(chosen, form, notes) if form.consecutive else chosen
+    episodes = [_exchanged(*part) for part in split]
     rewarded = all(step.reward is not None for episode in read for step in episode.kept)
     context = ExportContext(out=out, task=task, images=images, rewarded=rewarded)
     try:
@@ -163,17 +156,14 @@ def export_recording(
 def _require_options(form: Format, **given: object) -> None:
     for option, value in given.items():
         if value and option not in form.options:
-            takes = [name for name, other in formats().items() if option in other.options]
-            known = ", ".join(takes)
+            known = ", ".join(name for name, one in formats().items() if option in one.options)
             raise DemosError(f"The format {form.name} has no option {option!r}, unlike {known}.")
 
 
-def _exchanged(
-    episode: Episode, steps: Sequence[Step], outcome: str, since_s: float = 0.0
-) -> ExchangeEpisode:
-    """Return an episode, or a part of it that begins later and is exported as one."""
+def _exchanged(episode: Episode, steps: Sequence[Step], outcome: str) -> ExchangeEpisode:
+    """Return an episode, or a part of it, which begins at its first step."""
     header = episode.header
-    if since_s:
+    if steps and (since_s := _passed_s(episode.steps[0], steps[0])):
         with suppress(ValueError, OverflowError):
             began = datetime.fromisoformat(header.created) + timedelta(seconds=since_s)
             header = replace(header, created=began.isoformat(timespec="milliseconds"))
@@ -192,35 +182,39 @@ def _exchanged(
     return ExchangeEpisode(header=header, records=records(), name=name, outcome=outcome)
 
 
-def _consecutive(
-    episodes: Sequence[tuple[Episode, Sequence[Step]]], form: Format, notes: list[str]
-) -> list[ExchangeEpisode]:
+_Part = tuple[Episode, Sequence[Step], str]  # Of an episode, with its outcome.
+
+
+def _consecutive(chosen: Sequence[_Part], form: Format, notes: list[str]) -> list[_Part]:
     """Split episodes where steps are excluded or missing, and at pauses; add notes on it."""
-    parts: list[ExchangeEpisode] = []
-    off_s: list[float] = []
-    for episode, steps in episodes:
-        hz, starts = episode.header.control_hz, [0] if steps else []
+    parts: list[_Part] = []
+    off_s = 0.0
+    chosen = [part for part in chosen if part[1]]
+    first, *_ = chosen[0]
+    for episode, steps, outcome in chosen:
+        for name in ("action_layout", "state_layout", "image_size", "control_hz"):
+            if getattr(episode.header, name) != getattr(first.header, name):
+                text = f"{episode.path.name} differs from {first.path.name} in its {name}"
+                raise DemosError(f"{text}: export each kind to its own {form.title} dataset.")
+        hz, starts = episode.header.control_hz, [0]
         for number, (one, two) in enumerate(pairwise(steps), 1):
             if two.index != one.index + 1 or _passed_s(one, two) > longest_period_s(hz):
                 starts.append(number)
         for start, end in pairwise([*starts, len(steps)]):
             run = steps[start:end]
-            outcome = episode.outcome if end == len(steps) else ""
-            since_s = _passed_s(episode.steps[0], run[0])
-            parts.append(_exchanged(episode, run, outcome, since_s))
-            by_s = max(abs(_passed_s(run[0], step, n / hz) - n / hz) for n, step in enumerate(run))
-            off_s += [by_s] if by_s > 0.5 / hz else []
-    whole = sum(bool(steps) for _, steps in episodes)
-    if len(parts) > whole:
+            parts.append((episode, run, outcome if end == len(steps) else ""))
+            times_s = (_passed_s(run[0], step, n / hz) for n, step in enumerate(run))
+            off_s = max(off_s, *(abs(at_s - n / hz) for n, at_s in enumerate(times_s)))
+    if len(parts) > len(chosen):
         notes.append(
             f"{form.title} takes each step for the successor of the one before, so episodes are "
-            f"split at pauses and where steps are excluded or missing: {whole} became {len(parts)}."
+            f"split at pauses and where steps are excluded or missing: {len(chosen)} became "
+            f"{len(parts)}."
         )
-    if off_s and not form.timed:
+    if off_s > 0.5 / first.header.control_hz and not form.timed:
         notes.append(
             f"{form.title} takes the time of a step to be its number divided by the rate, which is "
-            f"off by more than half a period in {len(off_s)} of {len(parts)} episodes, by up to "
-            f"{max(off_s):.4g} s."
+            f"off by up to {off_s:.4g} s."
         )
     return parts
 

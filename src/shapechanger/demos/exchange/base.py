@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
-from math import inf, isfinite
+from math import inf
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
@@ -61,6 +61,7 @@ COMMANDS: Final = {
 }
 """Values of an action by their names in tables of other programs; a key that is held is 1."""
 
+_OTHER_SIZE: Final = "an image of {} x {} pixels, and not {} x {}"
 _MAX_FEATURES: Final = 512  # That values become one by one; more become one array feature.
 _NS_PER_S: Final = 1e9
 _PAUSE_PERIODS: Final = 30.0
@@ -90,7 +91,6 @@ class ExchangeRecord:
         number: Its number in the source; gaps are missing records.
         image: Its image in the source: a file, a JPEG, PNG or BMP, or pixels; None without one.
         frame: Equal for successive records that share an image; None to compare `image`.
-        size: Width and height of its image, if it was decoded before.
         fault: Why it cannot be imported; "" if it can.
     """
 
@@ -102,7 +102,6 @@ class ExchangeRecord:
     number: int = 0
     image: Path | bytes | NDArray[np.uint8] | None = None
     frame: object = None
-    size: tuple[int, int] | None = None
     fault: str = ""
 
 
@@ -210,9 +209,8 @@ class Format:
             format cannot be exported.
         options: Options that it takes: "camera" and "hz" on import; "task", "images" and "dropped"
             (excluded steps, marked as such) on export.
-        common: What all episodes of a dataset have in common, as names of fields of their
-            headers, such as "action_layout".
-        consecutive: Whether each step follows the one before, so that an export splits episodes.
+        consecutive: Whether each step follows the one before, so that an export splits episodes,
+            which must have the same layouts, image size and rate.
         timed: Whether it keeps the times of steps.
     """
 
@@ -223,7 +221,6 @@ class Format:
     read: Callable[[Path, ImportContext], Iterator[ExchangeEpisode]] | None = None
     write: Callable[[Sequence[ExchangeEpisode], Path, ExportContext], int] | None = None
     options: frozenset[str] = frozenset()
-    common: tuple[str, ...] = ()
     consecutive: bool = False
     timed: bool = True
 
@@ -236,32 +233,38 @@ def few(names: Sequence[object]) -> str:
 
 def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[ExchangeRecord]:
     """Yield the records of an episode that are whole, with images as JPEG; report the others."""
-    size = episode.header.image_size
-    shown, jpeg = None, None
+    size, shown, jpeg = episode.header.image_size, None, None
+    sizes = episode.header.action_layout.size, episode.header.state_layout.size
     for record in episode.records:
-        frame = record.image if record.frame is None else record.frame
-        step, fault = record.step, record.fault
-        if not fault and not all(map(isfinite, step.action)):
-            fault = "its action is not finite"
-        if not fault and step.driver not in DRIVERS:
-            fault = str(UnknownName("driver", step.driver, DRIVERS)).removesuffix(".")
-        if not fault and size is not None and record.image is not None and frame != shown:
-            try:
-                new, found = load_jpeg(record.image, record.size)
-                fault = _size_fault(found, size)
-                shown, jpeg = (shown, jpeg) if fault else (frame, new)
-            except DemosError as error:
-                fault = str(error)
-        if fault:
-            context.report("left out", fault, record.name)
-        else:
-            record.jpeg = jpeg
-            yield record
+        frame, new = record.image if record.frame is None else record.frame, None
+        record.fault = record.fault or record.step.refusal(*sizes)
+        if not record.fault and record.step.driver not in DRIVERS:
+            record.fault = str(UnknownName("driver", record.step.driver, DRIVERS))
+        if size is not None and frame != shown:
+            new, _ = _loaded(record, size)
+        if record.fault:
+            context.report("left out", record.fault.removesuffix("."), record.name)
+            continue
+        if new is not None:
+            shown, jpeg = frame, new
+        record.jpeg = jpeg
+        yield record
 
 
-def _size_fault(found: tuple[int, int], size: tuple[int, int]) -> str:
-    shown = "an image of {} x {} pixels, and not {} x {}".format(*found, *size)
-    return "" if found == size else shown
+def _loaded(
+    record: ExchangeRecord, size: tuple[int, int] | None = None
+) -> tuple[bytes | None, tuple[int, int] | None]:
+    """Return the image of a record as JPEG, and its size; without a whole one it gets a fault."""
+    if record.fault or record.image is None:
+        return None, None
+    try:
+        jpeg, found = load_jpeg(record.image)
+    except DemosError as error:
+        record.fault = str(error)
+        return None, None
+    if size is not None and found != size:
+        record.fault = _OTHER_SIZE.format(*found, *size)
+    return jpeg, found
 
 
 def decoded_images(
@@ -279,7 +282,8 @@ def decoded_images(
             raise DemosError(f"There is {found} {where}: {title} needs all images or none.")
         if size is not None and record.jpeg is not None and record.jpeg is not shown:
             shown, pixels = record.jpeg, decode_picture(record.jpeg, where)
-            if fault := _size_fault((pixels.shape[1], pixels.shape[0]), size):
+            if (found := (pixels.shape[1], pixels.shape[0])) != size:
+                fault = _OTHER_SIZE.format(*found, *size)
                 raise DemosError(f"{title} needs images of one size: step {where} has {fault}.")
         yield record, pixels
 
@@ -301,46 +305,44 @@ def drives(
         context: Collects the findings.
         stated_hz: Steps per second according to the source, if it does state them.
     """
-    for record in chain(*sessions):
-        if record.image is not None and not record.fault:
-            try:
-                _, record.size = load_jpeg(record.image)
-            except DemosError as error:
-                record.fault = str(error)
-    sizes = Counter(record.size for record in chain(*sessions) if record.size)
-    ((common, _),) = sizes.most_common(1) or [(None, 0)]
+    sizes = [[_loaded(record)[1] for record in session] for session in sessions]
+    ((common, _),) = Counter(filter(None, chain(*sizes))).most_common(1) or [(None, 0)]
     parts: list[list[ExchangeRecord]] = []
-    for session in sessions:
-        for record in session:
-            if record.size and common and not record.fault:
-                record.fault = _size_fault(record.size, common)
+    for session, found in zip(sessions, sizes, strict=True):
+        part: list[ExchangeRecord] = []
+        for record, size in zip(session, found, strict=True):
+            if size and common and size != common:
+                record.fault = _OTHER_SIZE.format(*size, *common)
             if record.fault:
                 context.report("left out", record.fault, record.name)
-        part = [record for record in session if not record.fault]
+            else:
+                part.append(record)
         missing = sum(record.step.captured_ns is None for record in part)
         if 0 < missing < len(part):
             text = "some records lack a time: the times of its session are left out"
             context.report("warning", text, part[0].name)
             _leave_out_times(part)
         parts += [part] if part else []
-    header = replace(header, image_size=common)
     for part, hz in zip(parts, _rates(parts, context, stated_hz), strict=True):
         timed, starts = part[0].step.captured_ns is not None, [0]
-        for number, (now, later) in enumerate(pairwise(part), 1):
-            passed_s = _passed_ns(now, later) / _NS_PER_S
-            if passed_s < 0.0:
-                context.report("warning", "time runs backwards: an episode begins", later.name)
-            elif passed_s > longest_period_s(hz):
-                context.report("note", "an episode begins after a pause", later.name)
-            if not 0.0 <= passed_s <= longest_period_s(hz):
-                starts.append(number)
-        head = replace(header, control_hz=hz, clock="real" if timed else "none")
+        for number, period_ns in enumerate(_periods_ns(part), 1):
+            if period_ns < 0:
+                text = "time runs backwards: an episode begins"
+                context.report("warning", text, part[number].name)
+            elif period_ns > longest_period_s(hz) * _NS_PER_S:
+                context.report("note", "an episode begins after a pause", part[number].name)
+            else:
+                continue
+            starts.append(number)
+        clock = "real" if timed else "none"
+        head = replace(header, image_size=common, control_hz=hz, clock=clock)
         for one, two in pairwise([*starts, len(part)]):
             yield part[one:two], head
 
 
-def _passed_ns(one: ExchangeRecord, two: ExchangeRecord) -> int:
-    return (two.step.captured_ns or 0) - (one.step.captured_ns or 0)
+def _periods_ns(part: Sequence[ExchangeRecord]) -> list[int]:
+    """Return the times between records; 0 for records without a time."""
+    return [(b.step.captured_ns or 0) - (a.step.captured_ns or 0) for a, b in pairwise(part)]
 
 
 def _leave_out_times(part: Iterable[ExchangeRecord]) -> None:
@@ -352,10 +354,12 @@ def _rates(
     parts: Sequence[list[ExchangeRecord]], context: ImportContext, stated_hz: float | None
 ) -> list[float]:
     """Return the rate of each session; times that contradict the stated one are left out."""
-    timed = [part if part[0].step.captured_ns is not None else [] for part in parts]
     periods_ns = [
-        [_passed_ns(a, b) / max(1, b.number - a.number) for a, b in pairwise(part)]
-        for part in timed
+        [
+            ns / max(1, b.number - a.number)
+            for ns, (a, b) in zip(_periods_ns(p), pairwise(p), strict=True)
+        ]
+        for p in parts
     ]
     measured = measured_hz([*chain.from_iterable(periods_ns)])
     about = f"{1e3 / (measured or inf):.4g} ms apart, {measured or 0.0:.4g} a second"
@@ -369,17 +373,18 @@ def _rates(
         context.report("note", UNKNOWN_RATE)
         return [DEFAULT_HZ] * len(parts)
     each = [(len(part) >= _MIN_PERIODS and measured_hz(part)) or measured for part in periods_ns]
-    differ = max(each) > _RATE_RATIO * min(each)
-    rates = [_nominal_hz(hz if differ else measured) for hz in each]
-    if differ:
+    if max(each) > _RATE_RATIO * min(each):
         text = f"The drives have from {min(each):.3g} to {max(each):.3g} steps a second."
         context.report("warning", text)
-    elif abs(measured / rates[0] - 1.0) > _WHOLE[0][1]:
-        text = f"The records are {about}, which is taken to be {rates[0]:g} Hz; --hz states it."
-        context.report("note", text)
+    else:
+        each = [measured] * len(parts)
+    rates = [_nominal_hz(hz) for hz in each]
     if not all(_SLOWEST_HZ <= hz <= _FASTEST_HZ for hz in rates):
         text = f"The records are {about}, unlike those of robots: --hz states the rate."
         context.report("warning", text)
+    elif abs(each[0] / rates[0] - 1.0) > _WHOLE[0][1]:
+        text = f"The records are {about}, which is taken to be {rates[0]:g} Hz; --hz states it."
+        context.report("note", text)
     return rates
 
 

@@ -41,21 +41,18 @@ _KNOWN_AS: Final = {
 }
 """Columns of `steps.csv`, each with its factor to their unit, by names in tables of others."""
 
-_Table = list[tuple[int, list[str]]]  # Lines with their numbers.
-
 _Columns = Mapping[str, Sequence[str]]  # The names of the columns of each field of a step.
 
 
 def _tables_of(folder: Path) -> list[Path]:
-    """Return the folders with a `steps.csv`: the folder itself, or its subfolders."""
-    if (folder / _TABLE).is_file():
-        return [folder]
-    return sorted(path.parent for path in folder.glob(f"*/{_TABLE}") if path.is_file())
+    """Return the tables in the folder itself, or in its subfolders."""
+    own = folder / _TABLE
+    return [own] if own.is_file() else sorted(filter(Path.is_file, folder.glob(f"*/{_TABLE}")))
 
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
-    actions, states = value_names(header.action_layout), value_names(header.state_layout)
-    values = dict.fromkeys(_VECTORS, actions) | {"state": states}
+    values = dict.fromkeys(_VECTORS, value_names(header.action_layout))
+    values["state"] = value_names(header.state_layout)
     return {
         field: [name + value for value in values.get(field, [""])] for field, name in _NAMES.items()
     }
@@ -78,61 +75,57 @@ def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.Expor
                 if record.jpeg is not None and record.jpeg is not shown:
                     frame, shown = f"{index:06d}.jpg", record.jpeg
                     (place / _FRAMES / frame).write_bytes(shown)
-                writer.writerow([index, frame, record.step.driver, *_cells(record, columns)])
+                writer.writerow([index, frame, *_cells(record, columns)])
                 steps += 1
     return steps
 
 
 def _cells(record: base.ExchangeRecord, columns: _Columns) -> Iterator[str]:
-    """Yield the cells of a step after those of its index, image and driver."""
-    for field, names in list(columns.items())[3:]:
-        value: Any = getattr(record if field in {"marks", "dropped"} else record.step, field)
+    """Yield the cells of a step after those of its index and image."""
+    plain = {"terminated": False, "truncated": False} | record.step.to_json()
+    plain |= {"marks": record.marks or None, "dropped": record.dropped}
+    for field, names in list(columns.items())[2:]:
+        value: Any = plain.get(field)
         if field in _VECTORS:
-            yield from [""] * len(names) if value is None else map(repr, value)
-        elif field == "terms":  # JSON has neither NaN nor infinity.
-            terms = {n: v if math.isfinite(v) else repr(v) for n, v in value.items()}
-            yield json.dumps(terms) if terms else ""
-        elif field == "dropped":  # For an unknown reason, which is "".
-            yield "" if value is None else json.dumps(value)
-        elif field in _IN_JSON:
-            yield json.dumps(value) if value else ""
+            values = [""] * len(names) if value is None else value
+            yield from ("nan" if one is None else str(one) for one in values)
+        elif field == "reward" and record.step.reward is not None:
+            yield repr(record.step.reward)
+        elif value is None:
+            yield ""
         else:
-            yield "" if value is None else repr(value).lower()
+            yield json.dumps(value) if field in _IN_JSON else str(value).lower()
 
 
 def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEpisode]:
-    for place in _tables_of(folder):
-        path = place / _TABLE
+    for path in _tables_of(folder):
+        place, where = path.parent, path.parent / _HEADER
         (_, names), *lines = files.read_table(path) or [(1, [])]
         names = [name.strip() for name in names]
-        read = _own if (place / _HEADER).is_file() else _others
-        yield from read(path, names, lines, context)
-
-
-def _own(
-    path: Path, names: list[str], lines: _Table, context: base.ImportContext
-) -> Iterator[base.ExchangeEpisode]:
-    if context.hz is not None:
-        raise DemosError("The format csv states the rate itself: leave out --hz.")
-    where, own = path.parent / _HEADER, files.read_json(path.parent / _HEADER)
-    ((header, outcome, _),) = files.own_episodes({"format": 1, "episodes": [own]}, where, 1)
-    columns = _columns(header)
-    expected = list(chain.from_iterable(columns.values()))
-    if names != expected:
-        wrong = ", ".join(sorted(set(names) ^ set(expected))[:5]) or "their order"
-        raise DemosError(f"{path} has other columns than {where}: {wrong}.")
-    records = _records(path.parent / _FRAMES, names, lines, columns, None)
-    if header.image_size is None and any(record.frame for record in records):
-        raise DemosError(f"{path} has images, but {where} has no image_size.")
-    yield base.ExchangeEpisode(
-        header=header, records=records, name=str(path.parent), outcome=outcome
-    )
+        if not where.is_file():
+            yield from _others(path, names, lines, context)
+            continue
+        if context.hz is not None:
+            raise DemosError("The format csv states the rate itself: leave out --hz.")
+        own = files.own_episodes({"format": 1, "episodes": [files.read_json(where)]}, where, 1)
+        ((header, outcome, _),) = own
+        columns = _columns(header)
+        expected = list(chain.from_iterable(columns.values()))
+        if names != expected:
+            wrong = ", ".join(sorted(set(names) ^ set(expected))[:5]) or "their order"
+            raise DemosError(f"{path} has other columns than {where}: {wrong}.")
+        records = _records(place / _FRAMES, place.name, names, lines, columns, {})
+        if header.image_size is None and any(record.frame for record in records):
+            raise DemosError(f"{path} has images, but {where} has no image_size.")
+        name = str(place)
+        yield base.ExchangeEpisode(header=header, records=records, name=name, outcome=outcome)
 
 
 def _others(
-    path: Path, stated: list[str], lines: _Table, context: base.ImportContext
+    path: Path, stated: list[str], lines: list[tuple[int, list[str]]], context: base.ImportContext
 ) -> Iterator[base.ExchangeEpisode]:
     """Yield the episodes of a table without a header."""
+    place = path.parent
     known = dict(_KNOWN_AS.get(name.lower(), (name, 1)) for name in stated)
     columns = {
         field: [n for n in known if (n.startswith(name) if field in _VECTORS else n == name)]
@@ -145,90 +138,83 @@ def _others(
         raise DemosError(f"{path} has two columns of one name: rename one of them.")
     if others := known.keys() - set(chain.from_iterable(columns.values())):
         context.report("note", f"Columns that are not imported: {', '.join(sorted(others))}.")
-    layouts: list[Layout] = []
-    for field in ("action", "state"):
-        values = [name.removeprefix(_NAMES[field]) for name in columns[field]]
-        features = (base.COMMANDS.get(name) or base.features_of(name, 1)[0] for name in values)
-        layouts.append(Layout(tuple(features)))
-    header = EpisodeHeader(action_layout=layouts[0], state_layout=layouts[1], source="csv")
-    records = _records(path.parent, list(known), lines, columns, known)
+    values = {
+        field: [name.removeprefix(_NAMES[field]) for name in columns[field]]
+        for field in ("action", "state")
+    }
+    actions, states = (
+        Layout(tuple(base.COMMANDS.get(name) or base.features_of(name, 1)[0] for name in names))
+        for names in values.values()
+    )
+    header = EpisodeHeader(action_layout=actions, state_layout=states, source="csv")
+    records = _records(place, place.name, list(known), lines, columns, known)
     for part, head in base.drives([records], header, context):
-        name = f"{path.parent}, from {part[0].name}"
+        name = f"{place}, from {part[0].name}"
         yield base.ExchangeEpisode(header=head, records=part, name=name)
 
 
 def _records(
     folder: Path,
+    where: str,
     names: Sequence[str],
-    lines: _Table,
+    lines: list[tuple[int, list[str]]],
     columns: _Columns,
-    factors: Mapping[str, int] | None,
+    factors: Mapping[str, int],
 ) -> list[base.ExchangeRecord]:
-    """Return the lines of a table with their images.
+    """Return the lines of a table with their images, which are in a folder.
 
-    An own table has no `factors` of columns, and the tables of others may lack columns.
+    Tables of others have `factors` of their columns, and may lack columns.
     """
     records: list[base.ExchangeRecord] = []
     shown, known, last = "", set[str](), -1
     for position, (line, cells) in enumerate(lines):
         record = base.ExchangeRecord(step=Step(action=(), driver="person"), number=position)
-        record.name = f"line {line} of {folder.parent.name if factors is None else folder.name}"
+        record.name = f"line {line} of {where}"
         records.append(record)
         try:
             if len(cells) != len(names):
                 raise ValueError(f"{len(cells)} cells instead of {len(names)}")
-            frame = _fill(record, dict(zip(names, cells, strict=True)), columns, factors)
-            if factors is None and record.step.index <= last:
+            fields = _fields(dict(zip(names, map(str.strip, cells), strict=True)), columns, factors)
+            marks, dropped, frame = (fields.pop(one, None) for one in ("marks", "dropped", "frame"))
+            record.marks = msgspec.convert(marks or (), tuple[str, ...])
+            record.dropped = msgspec.convert(dropped, str | None)
+            record.step = Step.from_json(fields)
+            if not factors and record.step.index <= last:
                 raise ValueError(f"step {record.step.index} is not after the step before")
             last = record.step.index
-            record.frame, record.image = frame, folder / frame if frame else None
             if frame and not files.is_inside(folder, frame):
                 raise ValueError("an image name that leaves the folder")
             if shown and not frame:
                 raise ValueError("no image")
             if frame != shown and frame in known:
                 raise ValueError(f"it returns to the image {frame!r} of an earlier step")
-            shown = frame
-            known.add(frame)
+            record.frame, record.image = frame, folder / frame if frame else None
+            shown = frame or ""
+            known.add(shown)
         except (ValueError, RecursionError, msgspec.ValidationError) as error:
             record.fault = str(error)
     return records
 
 
-def _fill(
-    record: base.ExchangeRecord,
-    cells: Mapping[str, str],
-    columns: _Columns,
-    factors: Mapping[str, int] | None,
-) -> str:
-    """Fill a record from the cells of a line, and return the name of its image."""
-    fields: dict[str, Any] = {} if factors is None else {"driver": "person"}
+def _fields(
+    cells: Mapping[str, str], columns: _Columns, factors: Mapping[str, int]
+) -> dict[str, Any]:
+    """Return the fields of a step from the cells of its line; empty ones are left out."""
+    fields: dict[str, Any] = {"driver": "person"} if factors else {}
+    fields["state"] = [math.nan] * len(columns["state"])
     for field, names in columns.items():
-        values = [cell for name in names if (cell := cells[name].strip())]
-        factor = (factors or {}).get(names[0], 1) if names else 1
+        values = [cell for name in names if (cell := cells[name])]
         if field in _VECTORS:
             fields |= {field: values} if values else {}
-        elif not values:
-            if factors is None and field in {"terminated", "truncated"}:
-                raise ValueError(f"{names[0]} is empty")
-        elif field in _IN_JSON:
-            fields[field] = json.loads(values[0])
-        elif factor > 1:
-            wrong = f"{names[0]} is not a time: {values[0]!r}"
-            with translate_errors(ArithmeticError, to=lambda _, wrong=wrong: ValueError(wrong)):
-                fields[field] = int((Decimal(values[0]) * factor).quantize(1))
-        else:
-            fields[field] = values[0]
-    sizes = [len(columns[field]) for field in ("action", "state")]
-    fields.setdefault("state", [math.nan] * sizes[1])
-    marks, dropped, frame = (fields.pop(name, None) for name in ("marks", "dropped", "frame"))
-    step = Step.from_json(fields)
-    if reason := step.refusal(*sizes):
-        raise ValueError(reason)
-    record.marks = msgspec.convert(marks or (), tuple[str, ...])
-    record.dropped = msgspec.convert(dropped, str | None)
-    record.step = step
-    return frame or ""
+        elif names and (values or field in {"terminated", "truncated"}):
+            (name,), text = names, cells[names[0]]
+            factor = factors.get(name, 1)
+            fields[field] = json.loads(text) if field in _IN_JSON else text
+            if factor > 1:
+                wrong = ValueError(f"{name} is not a time: {text!r}")
+                with translate_errors(ArithmeticError, to=lambda _, wrong=wrong: wrong):
+                    fields[field] = int((Decimal(text) * factor).quantize(1))
+    return fields
 
 
 FORMAT: Final = base.Format(

@@ -16,11 +16,11 @@ import glob
 import math
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, product, repeat
+from itertools import chain, product
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, cast
+from typing import Annotated, Any, Final, cast
 
 import msgspec
 import numpy as np
@@ -57,7 +57,6 @@ _Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e5)]
 class _Feature(msgspec.Struct, kw_only=True):
     """A feature of `info.json`."""
 
-    key: str = ""
     kind: str = msgspec.field(name="dtype")
     shape: tuple[Annotated[int, msgspec.Meta(ge=1)], ...]
     names: Any = None
@@ -69,23 +68,21 @@ class _Feature(msgspec.Struct, kw_only=True):
         return math.prod(self.shape)
 
     @property
-    def role(self) -> Literal["picture", "number", "unknown image", "other"]:
-        """What it is: an image that can be imported, numbers, another image, or anything else."""
+    def is_image(self) -> bool:
         is_depth = any(map((self.info or {}).get, ("video.is_depth_map", "is_depth_map")))
-        if self.kind in {"video", "image"} and not is_depth:
-            return "picture"
-        is_image = len(self.shape) == 3 or self.key.startswith(_CAMERAS) or is_depth
-        if _NUMBERS.fullmatch(self.kind) and self.size <= files.MAX_VALUES and not is_image:
-            return "number"
-        return "unknown image" if is_image or len(self.shape) > 1 else "other"
+        return self.kind in {"video", "image"} and not is_depth
 
-    def picture_size(self, path: Path) -> tuple[int, int]:
-        """Return the width and height of its images, pixels, which are compared with it."""
+    @property
+    def is_number(self) -> bool:
+        fits = len(self.shape) != 3 and self.size <= files.MAX_VALUES
+        return fits and _NUMBERS.fullmatch(self.kind) is not None
+
+    def image_size(self, where: str) -> tuple[int, int]:
+        """Return the width and height of its images, pixels."""
         shape = (*self.shape, 1, 1)[:3]
         height, width, channels = shape if shape[-1] in _CHANNELS else (*shape[1:], shape[0])
         if len(self.shape) < 2 or channels not in _CHANNELS or height * width > MAX_PIXELS:
-            shown = list(self.shape)
-            raise DemosError(f"{path}: {self.key} has the shape {shown}, not of an image.")
+            raise DemosError(f"{where} has the shape {list(self.shape)}, not of an image.")
         return width, height
 
 
@@ -119,43 +116,50 @@ class _Dataset:
     """A dataset that is read."""
 
     def __init__(self, folder: Path, context: base.ImportContext) -> None:
-        self._folder = folder
-        self._context = context
-        self._path = folder / INFO
-        self._info: _Info = files.read_json(self._path, _Info)
-        if not (version := self._info.codebase_version).startswith("v3."):
+        self._folder, self._context, path = folder, context, folder / INFO
+        self._info: _Info = files.read_json(path, _Info)
+        features, version = self._info.features, self._info.codebase_version
+        if not version.startswith("v3."):
             raise DemosError(
                 f"{folder} has version {version} of LeRobot's format, and only 3 can be imported: "
                 "lerobot.datasets.v30.convert_dataset_v21_to_v30 of lerobot 0.4 converts v2.1."
             )
-        for key, feature in self._info.features.items():
-            feature.key = key
-        self._choose_features(list(self._info.features.values()))
-        camera = self._camera
-        self._size = None if camera is None else camera.picture_size(self._path)
-        self._stored = camera.key if camera and camera.kind == "image" else ""
-        self._video = f"videos/{camera.key}/" if camera and camera.kind == "video" else ""
-        self._entries = self._read_entries()
-        self._most_bytes = files.MAX_UNPACKED  # Of images in the tables, which can share one.
-        self._rows = self._find_rows()
-        self._filmed: dict[str, list[_Entry]] = defaultdict(list)
-        self._videos: dict[str, VideoTimes | DemosError] = {}
-        for entry in self._entries.values():
-            self._filmed[self._video_name(entry)].append(entry)
-
-    def read(self) -> Iterator[base.ExchangeEpisode]:
-        """Yield the episodes whose keys agree; the others are reported."""
-        notes = {"dataset": self._folder.resolve().name}
-        header = EpisodeHeader(
-            action_layout=_layout([self._action], self._context),
-            state_layout=_layout(self._states, self._context),
+        sizes = {key: one.size for key, one in features.items() if one.is_number}
+        if _ACTION not in sizes:
+            raise DemosError(f"{path} has no numeric feature {_ACTION!r}, so no action.")
+        states = [k for k in sizes if k.startswith(_OBSERVATION) and not k.startswith(_CAMERAS)]
+        self._states = sorted(states, key=lambda key: key != _STATE)  # Stable: the state first.
+        single = [key for key in (_REWARD, DONE, _TERMINATED) if sizes.get(key) == 1]
+        self._sizes = {key: sizes[key] for key in (_ACTION, *states)}
+        self._sizes |= dict.fromkeys((*single, *_KEYS), 1)
+        cameras = {k.removeprefix(_CAMERAS): k for k, one in features.items() if one.is_image}
+        context.camera = context.camera.removeprefix(_CAMERAS)
+        camera = cameras.get(base.choose_camera(folder, list(cameras), context), "")
+        self._size = features[camera].image_size(f"{path}: {camera}") if camera else None
+        self._stored = [camera] if camera and features[camera].kind == "image" else []
+        self._video = f"videos/{camera}/" if camera and not self._stored else ""
+        for key, one in features.items():
+            if key not in {*self._sizes, camera, "task_index"}:
+                about = f"{key} ({one.kind}, {' x '.join(map(str, one.shape))})"
+                context.report("note", f"The feature {about} is not imported.")
+        notes = {"dataset": folder.resolve().name} | ({"camera": camera} if camera else {})
+        self._header = EpisodeHeader(
+            action_layout=self._layout([_ACTION]),
+            state_layout=self._layout(self._states),
             image_size=self._size,
             control_hz=self._info.fps,
             robot=self._info.robot_type or "",
             source="lerobot",
-            notes=notes | ({"camera": self._camera.key} if self._camera else {}),
+            notes=notes,
         )
-        path = self._folder / OURS
+        self._entries = self._read_entries()
+        self._most_bytes = files.MAX_UNPACKED  # Of images in the tables, which can share one.
+        self._rows = self._find_rows()
+        self._videos: dict[str, VideoTimes] = {}
+
+    def read(self) -> Iterator[base.ExchangeEpisode]:
+        """Yield the episodes; one whose keys disagree is refused when its records are read."""
+        path, header = self._folder / OURS, self._header
         count, is_ours = max(self._entries) + 1, path.is_file()
         own = files.own_episodes(files.read_json(path), path, count, header) if is_ours else []
         for number, entry in self._entries.items():
@@ -166,28 +170,20 @@ class _Dataset:
             records, name = self._records(entry, drivers), f"episode {number}"
             yield base.ExchangeEpisode(header=head, records=records, name=name, outcome=outcome)
 
-    def _choose_features(self, features: Sequence[_Feature]) -> None:
-        """Choose the action, the states, the camera and single numbers, and report the others."""
-        context = self._context
-        numbers = {feature.key: feature for feature in features if feature.role == "number"}
-        if _ACTION not in numbers:
-            raise DemosError(f"{self._path} has no numeric feature {_ACTION!r}, so no action.")
-        self._action = numbers[_ACTION]
-        self._states = [f for key, f in numbers.items() if key.startswith(_OBSERVATION)]
-        self._states.sort(key=lambda feature: feature.key != _STATE)  # Stable: the state first.
-        single = {key for key, feature in numbers.items() if feature.size == 1}
-        self._columns = {_REWARD, DONE, _TERMINATED} & single
-        cameras = {f.key.removeprefix(_CAMERAS): f for f in features if f.role == "picture"}
-        context.camera = context.camera.removeprefix(_CAMERAS)
-        self._camera = cameras.get(base.choose_camera(self._folder, list(cameras), context))
-        taken = {_ACTION, *(f.key for f in self._states), *self._columns, *_KEYS, "task_index"}
-        for feature in features:
-            if feature.key not in taken and feature is not self._camera:
-                about = f"{feature.key} ({feature.kind}, {' x '.join(map(str, feature.shape))})"
-                if feature.role == "unknown image":
-                    context.report("left out", "images of an unknown kind or of depth", about)
-                else:
-                    context.report("note", f"The feature {about} is not imported.")
+    def _layout(self, keys: Sequence[str]) -> Layout:
+        """Return a layout for the values of features, in order, with their names and units."""
+        found: list[Feature] = []
+        for key in keys:
+            feature, short = self._info.features[key], key.removeprefix(_OBSERVATION)
+            prefix = "" if key in {_ACTION, _STATE} else f"{short}/"
+            names = [name and prefix + name for name in _flat_names(feature.names)]
+            if names and (len(set(names)) != feature.size or not all(names)):
+                text = f"The names of {key} do not fit its {feature.size} values: numbers do."
+                self._context.report("note", text)
+                names = []
+            units = _flat_names(feature.units)
+            found += base.features_of(short, feature.size, names=names, units=units)
+        return Layout(tuple(found))
 
     def _read_entries(self) -> dict[int, _Entry]:
         """Return the rows of `meta/episodes` by their number, in order."""
@@ -196,7 +192,7 @@ class _Dataset:
         entries: list[_Entry] = []
         for path in sorted((self._folder / EPISODES).glob("*/*.parquet")):
             files.inside(self._folder, str(path.relative_to(self._folder)), path)
-            for _, batch in _batches(path, names):
+            for batch in _batches(path, names):
                 rows = batch.rename_columns(list(fields)).to_pylist()
                 entries += files.converted(rows, list[_Entry], path, strict=False)
         found = {entry.episode_index: entry for entry in entries}
@@ -208,32 +204,24 @@ class _Dataset:
             self._context.report("warning", text)
         return dict(sorted(found.items()))
 
-    def _find_rows(self) -> dict[float, list[tuple[Path, set[int]]]]:
-        """Return the files and row groups with rows of each episode.
+    def _find_rows(self) -> dict[float, list[Path]]:
+        """Return the files with rows of each episode.
 
         All files are searched, because LeRobot's converter to version 3 wrote wrong numbers of
         files to `meta/episodes` (its issue 2401).
         """
-        found = defaultdict[float, list[tuple[Path, set[int]]]](list)
-        columns = set[str]()
+        found, columns = defaultdict[float, list[Path]](list), set[str]()
         pattern = _PLACE.sub("*", glob.escape(self._info.data_path))
         for name in sorted(glob.glob(pattern, root_dir=self._folder)):
-            try:
-                path = files.inside(self._folder, name, INFO)
-                groups = defaultdict[float, set[int]](set)
-                for group, batch in _batches(path, _KEYS[:1]):
-                    for number in np.unique(_vectors(batch, _KEYS[0], 1, path)).tolist():
-                        groups[number].add(group)
-                columns |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
-            except DemosError as error:
-                self._context.report("left out", str(error).removesuffix("."), name)
-                continue
+            path = files.inside(self._folder, name, INFO)
+            batches = (_vectors(batch, _KEYS[0], 1) for batch in _batches(path, _KEYS[:1]))
+            for number in {number for batch in batches for number in np.unique(batch).tolist()}:
+                found[number].append(path)
+            columns |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
             self._most_bytes += _MAX_PACKED * path.stat().st_size
-            for number, these in groups.items():
-                found[number].append((path, these))
         for column in sorted(columns - self._info.features.keys()):
             if not column.startswith("__index_level_"):  # Of pandas.
-                self._context.report("left out", f"a column that {INFO} does not describe", column)
+                self._context.report("note", f"The column {column} is not imported.")
         for number in sorted(found.keys() - self._entries.keys()):
             self._context.report("left out", f"{EPISODES} does not have it", f"episode {number:g}")
         return found
@@ -245,13 +233,15 @@ class _Dataset:
         template = self._info.video_path or ""
         return _PLACE.sub(lambda at: about[at[1]].rjust(int(at[2] or 0), "0"), template)
 
-    def _read_video(self, name: str) -> VideoTimes:
+    def _times(self, name: str) -> VideoTimes:
         """Return the times of a video, if they are those that its entries state."""
-        entries = self._filmed[name]
+        if name in self._videos:
+            return self._videos[name]
         times = read_times(files.inside(self._folder, name, self._folder / EPISODES))
         if times.size != self._size:
             raise DemosError(f"{name} has images of {times.size} pixels, not {self._size}.")
-        spans_s = np.array(sorted((entry.from_timestamp, entry.to_timestamp) for entry in entries))
+        entries = (one for one in self._entries.values() if self._video_name(one) == name)
+        spans_s = np.array(sorted((one.from_timestamp, one.to_timestamp) for one in entries))
         steps_s = np.diff(times.seconds)
         half_s = 0.5 * float(np.median(steps_s)) if len(steps_s) else 0.5 / self._info.fps
         shown_s = times.seconds[[0, -1]] + [0.0, 2.0 * half_s]
@@ -267,19 +257,13 @@ class _Dataset:
             self._context.report("warning", f"There are more images: {about}.")
         if (np.diff(spans_s.ravel()) < -half_s).any():
             raise DemosError(f"Parts of {name} overlap, or end before they begin.")
+        self._videos[name] = times
         return times
 
-    def _pictures(self, entry: _Entry) -> Iterator[NDArray[np.uint8]]:
+    def _filmed(self, entry: _Entry) -> Iterator[NDArray[np.uint8]]:
         """Return the image of each step of an episode; refuse an episode that lacks one."""
         name = self._video_name(entry)
-        if name not in self._videos:
-            try:
-                self._videos[name] = self._read_video(name)
-            except DemosError as error:
-                self._videos[name] = error
-        times = self._videos[name]
-        if isinstance(times, DemosError):
-            raise times
+        times = self._times(name)
         at_s = entry.from_timestamp + np.arange(entry.length) / self._info.fps
         most_s = _TOLERANCE_S + _ROUNDING * at_s + 0.5 * float(times.tick_s)
         nearest = np.searchsorted((times.seconds[1:] + times.seconds[:-1]) / 2.0, at_s)
@@ -290,59 +274,47 @@ class _Dataset:
 
     def _records(self, entry: _Entry, drivers: Iterator[Driver]) -> Iterator[base.ExchangeRecord]:
         """Yield the records of an episode; refuse rows with other keys than expected."""
-        number, rate_hz = entry.episode_index, self._info.fps
-        sizes = {f.key: f.size for f in (self._action, *self._states)}
-        sizes |= dict.fromkeys((*self._columns, *_KEYS), 1)
-        steps = enumerate(self._pictures(entry) if self._video else repeat(None, entry.length))
-        done, read = 0, b""
-        stored = [self._stored] if self._stored else []
-        if len(places := self._rows.get(number, [])) != 1:
-            raise DemosError(f"{len(places)} files of {self._info.data_path} have its rows, not 1.")
-        ((path, groups),) = places
-        for _, batch in _batches(path, [*sizes, *stored], groups):
-            columns = {key: _vectors(batch, key, size, path) for key, size in sizes.items()}
-            ours = np.flatnonzero(columns[_KEYS[0]] == number)
-            if not len(ours):
-                continue
-            here = slice(ours[0], ours[-1] + 1)
-            columns = {key: values[here] for key, values in columns.items()}
-            rows = len(columns[_ACTION])
-            frames = np.arange(done, done + rows)
-            done += rows
-            first, keys = entry.dataset_from_index, np.hstack([columns[key] for key in _KEYS])
-            right = [np.full(rows, number), frames, frames + first, frames / rate_hz]
+        number, rate_hz, first = entry.episode_index, self._info.fps, entry.dataset_from_index
+        images = self._filmed(entry) if self._video else None
+        where, done, read = f"episode {number}", 0, b""
+        paths, names = self._rows.get(number, []), [*self._sizes, *self._stored]
+        for batch in chain.from_iterable(_batches(path, names, number) for path in paths):
+            columns = {key: _vectors(batch, key, size) for key, size in self._sizes.items()}
+            rows = np.flatnonzero(columns[_KEYS[0]] == number)
+            frames = np.arange(done, done + len(rows))
+            done += len(rows)
+            keys = np.hstack([columns[key][rows] for key in _KEYS])
+            right = [np.full_like(frames, number), frames, frames + first, frames / rate_hz]
             right = np.stack(right, axis=1)
             if done > entry.length or not np.allclose(keys, right, _ROUNDING, _TOLERANCE_S):
-                raise DemosError(f"{path}: keys of episode {number} do not fit {EPISODES}.")
-            images = batch.column(self._stored)[here] if stored else None
-            for row in range(rows):
-                frame, image = next(steps)
-                driver = cast("Driver", next(drivers, "person"))
-                single = {key: float(columns[key][row, 0]) for key in self._columns}
-                reward, is_done = single.get(_REWARD, math.nan), bool(single.get(DONE, False))
-                ended = bool(single.get(_TERMINATED, is_done))
-                if images is not None:
-                    image = _bytes(images[row].as_py())
+                raise DemosError(f"The keys of {where} do not fit {EPISODES}.")
+            for frame, row in zip(frames.tolist(), rows.tolist(), strict=True):
+                one = {key: values[row].tolist() for key, values in columns.items()}
+                (reward,), (is_done,) = one.get(_REWARD, [math.nan]), one.get(DONE, [0.0])
+                (ended,) = one.get(_TERMINATED, [is_done])
+                image = next(images) if images else None
+                for name in self._stored:
+                    image = _bytes(batch.column(name)[row].as_py())
                     self._most_bytes -= 0 if image == read else len(image)
                     read = image
                     if self._most_bytes < 0:
-                        raise DemosError(f"{path} has images of far more bytes than its files.")
+                        raise DemosError(f"{where} has images of far more bytes than its files.")
                 yield base.ExchangeRecord(
-                    name=f"step {frame} of episode {number}",
+                    name=f"step {frame} of {where}",
                     step=Step(
-                        action=tuple(columns[_ACTION][row].tolist()),
-                        driver=driver,
-                        state=tuple(v for f in self._states for v in columns[f.key][row].tolist()),
+                        action=tuple(one[_ACTION]),
+                        driver=next(drivers, None) or "person",
+                        state=tuple(value for key in self._states for value in one[key]),
                         captured_ns=round(frame / rate_hz * 1e9),
                         reward=None if math.isnan(reward) else reward,
-                        terminated=ended,
-                        truncated=is_done and not ended,
+                        terminated=bool(ended),
+                        truncated=bool(is_done and not ended),
                     ),
                     image=image,
                     frame=frame if self._video else None,
                 )
         if done < entry.length:
-            raise DemosError(f"{path} has {done} rows of {entry.length} of episode {number}.")
+            raise DemosError(f"The data have {done} of the {entry.length} rows of {where}.")
 
 
 def _bytes(image: Any) -> bytes:
@@ -366,58 +338,42 @@ def _flat_names(plain: Any) -> tuple[str, ...]:
     return tuple(map(str, cast("list[Any]", plain))) if isinstance(plain, list) else ()
 
 
-def _layout(features: Sequence[_Feature], context: base.ImportContext) -> Layout:
-    """Return a layout for the values of features, in order, with their names and units."""
-    found: list[Feature] = []
-    for feature in features:
-        key, size = feature.key.removeprefix(_OBSERVATION), feature.size
-        prefix = "" if feature.key in {_ACTION, _STATE} else f"{key}/"
-        names = [name and prefix + name for name in _flat_names(feature.names)]
-        if names and (len(set(names)) != size or not all(names)):
-            text = f"The names of {feature.key} do not fit its {size} values: numbers do."
-            context.report("note", text)
-            names = []
-        found += base.features_of(key, size, names=names, units=_flat_names(feature.units))
-    return Layout(tuple(found))
-
-
-def _batches(
-    path: Path, columns: Sequence[str], groups: Iterable[int] | None = None
-) -> Iterator[tuple[int, Any]]:
-    """Yield the rows of a Parquet file, or of its groups, a few at a time, with their group."""
+def _batches(path: Path, columns: Sequence[str], number: float | None = None) -> Iterator[Any]:
+    """Yield the rows of a Parquet file, or at least those of an episode, a few at a time."""
     arrow, parquet = (files.library(name, "lerobot") for name in ("pyarrow", "pyarrow.parquet"))
     try:
         # Otherwise a whole row group is in memory, which may be an episode of images.
         with parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20) as file:
-            about, size = file.metadata, path.stat().st_size
-            every = product(range(about.num_row_groups), range(about.num_columns))
-            parts = [about.row_group(group).column(n) for group, n in every]
-            sizes = [max(part.total_uncompressed_size, 8 * part.num_values) for part in parts]
-            claims = [(n, part.path_in_schema) for n, part in zip(sizes, parts, strict=True)]
-            if (most := sum(sizes)) > files.MAX_UNPACKED + _MAX_PACKED * size:
-                raise DemosError(f"{path} has {size} bytes, but claims to unpack to {most}.")
-            if about.num_rows > size:
-                raise DemosError(f"{path} has {size} bytes, but claims {about.num_rows} rows.")
+            about, size, largest, claimed = file.metadata, path.stat().st_size, 1, 0
             if missing := [key for key in columns if key not in file.schema_arrow.names]:
                 raise DemosError(f"{path} has no column {missing[0]!r}.")
+            groups = list(range(about.num_row_groups))
+            for group, place in product(tuple(groups), range(about.num_columns)):
+                part = about.row_group(group).column(place)
+                unpacked = max(part.total_uncompressed_size, 8 * part.num_values)
+                claimed += unpacked
+                if part.path_in_schema.startswith(tuple(columns)):
+                    largest = max(largest, unpacked)
+                span = part.statistics if part.path_in_schema == _KEYS[0] else None
+                if number is not None and span is not None and span.has_min_max:
+                    groups = [n for n in groups if n != group or span.min <= number <= span.max]
+            if claimed > files.MAX_UNPACKED + _MAX_PACKED * size or about.num_rows > size:
+                text = f"{size} bytes, but claims {about.num_rows} rows of {claimed} bytes"
+                raise DemosError(f"{path} has {text}.")
             # Many rows may share one large value, which is in memory once for each.
-            largest = max((n for n, name in claims if name.startswith(tuple(columns))), default=1)
-            rows = max(1, min(_ROWS, files.MAX_UNPACKED // max(1, largest)))
-            for group in range(about.num_row_groups) if groups is None else sorted(groups):
-                for batch in file.iter_batches(rows, row_groups=[group], columns=columns):
-                    yield group, batch
+            rows = max(1, min(_ROWS, files.MAX_UNPACKED // largest))
+            yield from file.iter_batches(rows, row_groups=groups, columns=columns)
     except (arrow.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
         raise DemosError(f"{path} is not an intact Parquet file: {reason}.") from error
 
 
-def _vectors(batch: Any, key: str, size: int, path: Path) -> NDArray[np.float64]:
+def _vectors(batch: Any, key: str, size: int) -> NDArray[np.float64]:
     """Return the numbers of a column, shape (n, size)."""
     try:
-        values = np.array(batch.column(key).to_pylist(), np.float64)
-        return values.reshape(batch.num_rows, size)
+        return np.array(batch.column(key).to_pylist(), np.float64).reshape(batch.num_rows, size)
     except (TypeError, ValueError) as error:
-        raise DemosError(f"{path}: {key!r} does not have {size} numbers in each row.") from error
+        raise DemosError(f"A row of {key!r} does not have {size} numbers.") from error
 
 
 FORMAT: Final = base.Format(
@@ -428,7 +384,6 @@ FORMAT: Final = base.Format(
     read=lambda folder, context: _Dataset(folder, context).read(),
     write=write,
     options=frozenset({"camera", "task", "images"}),
-    common=("action_layout", "state_layout", "image_size", "control_hz"),
     consecutive=True,
     timed=False,
 )

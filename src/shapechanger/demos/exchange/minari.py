@@ -7,8 +7,8 @@ the index of the image in the episode, the same for steps that share an image, a
 contains all fields without a separate column, as JSON. An unknown reward is NaN. `metadata.json`
 has the headers of the episodes.
 
-Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
-encodes each image again at JPEG quality 75, and needs the whole episode in memory.
+Minari's own writer (`MinariStorage.update_episodes`) is not used: it decodes and encodes each image
+again at JPEG quality 75, and needs the whole episode in memory.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import math
 import re
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
@@ -48,7 +47,6 @@ _ACTION, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
     for field in ("action", "reward", "terminated", "truncated", "driver")
 )
 _IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys left out of `infos/step`.
-_STORAGE: Final = "minari.dataset.minari_storage"
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
 _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
@@ -59,7 +57,6 @@ _DESCRIPTION: Final = (
     "Episodes recorded by Shapechanger, and exported without changes: images are the recorded "
     "JPEGs, numbers have 64 bits, and the last observation of an episode is repeated."
 )
-_BAD_JSON: Final = (ValueError, TypeError, RecursionError, msgspec.DecodeError)
 
 
 class _Rest(msgspec.Struct):
@@ -71,8 +68,6 @@ class _Rest(msgspec.Struct):
 
 
 class _Metadata(msgspec.Struct, kw_only=True):
-    """`metadata.json`."""
-
     observation_space: str
     action_space: str
     total_episodes: Annotated[int, msgspec.Meta(ge=1)]
@@ -95,31 +90,40 @@ class _Space(msgspec.Struct, kw_only=True):
     nvec: Any = 0
     subspaces: dict[str, _Space] | list[_Space] = []
 
-    def leaves(self, at: str = "") -> Iterator[tuple[str, _Space]]:
-        """Yield the spaces in it, in the order and with the keys of Minari's files."""
+    def leaves(self, column: str) -> Iterator[tuple[str, _Space]]:
+        """Yield the spaces in it with their columns, in the order of Minari's files."""
         match self.subspaces:
             case dict() as named:
                 inner = sorted(named.items())
             case listed:
                 inner = [(f"_index_{n}", one) for n, one in enumerate(listed)]
         for key, one in inner:
-            yield from one.leaves(f"{at}/{key}")
+            yield from one.leaves(f"{column}/{key}")
         if self.type not in {"Dict", "Tuple"}:
-            yield at, self
+            yield column, self
 
-    def numbers(self) -> tuple[tuple[int, ...], Any, Any] | None:
-        """Return the shape and the bounds of numbers; None for anything else."""
+    def bounds(self) -> list[list[float]]:
+        """Return the bounds of its numbers; [] for anything else, and for too many."""
+        shape, low, high = self.shape, self.low, self.high
         match self.type:
             case "Box":
-                return self.shape, self.low, self.high
+                shape = (0,) if len(shape) > 1 and self.dtype in _DEEP else shape
             case "Discrete":
-                return (), self.start, self.start + self.n - 1
+                low, high = self.start, self.start + self.n - 1
             case "MultiDiscrete":
-                return np.shape(self.nvec), self.start, np.add(self.start, self.nvec) - 1
+                shape, low, high = (
+                    np.shape(self.nvec),
+                    self.start,
+                    np.add(self.start, self.nvec) - 1,
+                )
             case "MultiBinary":
-                return tuple(np.atleast_1d(self.n).tolist()), 0, 1
+                shape = tuple(np.atleast_1d(self.n).tolist())
             case _:
-                return None
+                return []
+        if not 0 < (size := math.prod(shape)) <= MAX_VALUES:
+            return []
+        ends = (np.ravel(end).astype(float) for end in (low, high))
+        return [np.broadcast_to(end, size).tolist() for end in ends]
 
     def image_size(self) -> tuple[int, int] | None:
         """Return the width and height of its images; None if it has no images."""
@@ -135,9 +139,10 @@ def _colours_first(shape: Sequence[int]) -> bool:
     return len(shape) == 3 and shape[0] in _CHANNELS and shape[2] not in _CHANNELS
 
 
-def _data_folder(folder: Path) -> Path | None:
-    """Return the folder with the files of a dataset, `data` or `folder` itself; None if missing."""
-    return next((p for p in (folder / _DATA, folder) if (p / _METADATA).is_file()), None)
+def _metadata_of(folder: Path) -> Path | None:
+    """Return the metadata in `data` or in the folder itself, next to the file of the data."""
+    paths = (folder / _DATA / _METADATA, folder / _METADATA)
+    return next((path for path in paths if path.is_file()), None)
 
 
 @contextmanager
@@ -151,9 +156,9 @@ def _opened(path: Path) -> Generator[Any]:
         yield file
 
 
-def _arrays(file: Any, number: int) -> dict[str, Any]:
+def _arrays(file: Any, name: str) -> dict[str, Any]:
     """Return the arrays of an episode, keyed by path; links and external files are not followed."""
-    h5py, name, found = library("h5py"), f"episode_{number}", dict[str, Any]()
+    h5py, found = library("h5py"), dict[str, Any]()
     is_there = isinstance(file.get(name, getlink=True), h5py.HardLink)
     if not is_there or not isinstance(file[name], h5py.Group):
         raise DemosError(f"{file.filename} has no {name}.")
@@ -169,28 +174,32 @@ class _Dataset:
     """A dataset that is read."""
 
     def __init__(self, folder: Path, context: base.ImportContext) -> None:
-        place = _data_folder(folder) or folder
-        self._path = path = place / _METADATA
-        self._context = context
+        path = _metadata_of(folder) or folder / _METADATA
         about: _Metadata = files.read_json(path, _Metadata)
         if about.data_format != "hdf5":
             raise DemosError(f"{folder} is stored as {about.data_format!r}: only 'hdf5' is read.")
-        self._main = files.inside(place, _MAIN, path)
-        self._count, self._most = about.total_episodes, self._main.stat().st_size
-        if self._count > self._most:
+        self._context, self._count = context, about.total_episodes
+        self._main = files.inside(path.parent, _MAIN, path)
+        self._values = self._main.stat().st_size  # That the file can still hold.
+        if self._count > self._values:
             raise DemosError(f"{path} claims {self._count} episodes, but {_MAIN} is smaller.")
-        self._claimed = 0
         observed, acted = (
-            dict(files.parse_json(text, f"A space in {path}", _Space).leaves())
-            for text in (about.observation_space, about.action_space)
+            dict(files.parse_json(text, f"A space in {path}", _Space).leaves(column))
+            for text, column in (
+                (about.observation_space, _OBSERVATIONS),
+                (about.action_space, _ACTION),
+            )
         )
-        images = {at: size for at, space in observed.items() if (size := space.image_size())}
-        if len(images) > 1:
-            raise DemosError(f"{path} has {len(images)} images ({', '.join(images)}): keep one.")
-        self._image = "".join(_OBSERVATIONS + at for at in images)
-        self._shape = next((observed[at].shape for at in images), None)  # Of pixels.
-        sensed = {at: space for at, space in observed.items() if at not in images}
-        states, actions = self._features(sensed, _OBSERVATIONS), self._features(acted, _ACTION)
+        self._images = {at: space for at, space in observed.items() if space.image_size()}
+        if len(self._images) > 1:
+            names = ", ".join(self._images)
+            raise DemosError(f"{path} has {len(self._images)} images ({names}): keep one.")
+        sensed = {at: space for at, space in observed.items() if at not in self._images}
+        wrong = f"A space in {path} is damaged"
+        with translate_errors(
+            TypeError, ValueError, to=lambda error: DemosError(f"{wrong}: {error}.")
+        ):
+            states, actions = self._features(sensed), self._features(acted)
         if len(actions) < len(acted):
             names = "Box, Discrete, MultiDiscrete or MultiBinary"
             raise DemosError(f"{path}: the action_space must consist of {names} of few values.")
@@ -201,14 +210,14 @@ class _Dataset:
         self._header = EpisodeHeader(
             action_layout=Layout(tuple(chain(*actions.values()))),
             state_layout=Layout(tuple(chain(*states.values()))),
-            image_size=next(iter(images.values()), None),
+            image_size=next((space.image_size() for space in self._images.values()), None),
             control_hz=hz or base.DEFAULT_HZ,
             clock="none",
             source="minari",
             notes={"dataset": about.dataset_id, "rate_is_known": hz is not None},
         )
         self._own = (
-            [*files.own_episodes(about.ours, path, self._count, self._header)]
+            files.own_episodes(about.ours, path, self._count, self._header)
             if about.ours is not None
             else []
         )
@@ -218,28 +227,18 @@ class _Dataset:
             for features in (actions, states)
         )
 
-    def _features(self, leaves: Mapping[str, _Space], part: str) -> dict[str, list[Feature]]:
+    def _features(self, leaves: Mapping[str, _Space]) -> dict[str, list[Feature]]:
         """Return the features of each numeric leaf, keyed by column; other leaves are reported."""
         found: dict[str, list[Feature]] = {}
-        for at, space in leaves.items():
-            what = part.removesuffix("s")
-            name = at.strip("/") or what
-            about = f"{what} {name} ({space.type} {space.dtype} {list(space.shape)})"
-            wrong = f"The {about} in {self._path} is damaged."
-            with translate_errors(TypeError, ValueError, to=lambda _, w=wrong: DemosError(w)):
-                if (numbers := space.numbers()) is None:
-                    self._context.report("note", f"The {about} is not imported.")
-                    continue
-                shape, *ends = numbers
-                size, deep = math.prod(shape), len(shape) > 1 and space.dtype in _DEEP
-                if deep or not 0 < size <= MAX_VALUES:
-                    reason = f"no or more than {MAX_VALUES} values, or images of depth"
-                    self._context.report("left out", reason, about)
-                    continue
-                low, high = (np.broadcast_to(np.ravel(end).astype(float), size) for end in ends)
-                found[part + at] = base.features_of(
-                    name, size, low=low.tolist(), high=high.tolist()
-                )
+        for column, space in leaves.items():
+            part, _, key = column.partition("/")
+            part = part.removesuffix("s")
+            name = key or part
+            if ends := space.bounds():
+                found[column] = base.features_of(name, len(ends[0]), low=ends[0], high=ends[1])
+            else:
+                about = f"{part} {name} ({space.type} {space.dtype} {list(space.shape)})"
+                self._context.report("note", f"The {about} is not imported.")
         return found
 
     def read(self) -> Iterator[base.ExchangeEpisode]:
@@ -250,16 +249,16 @@ class _Dataset:
                 self._context.report("warning", text)
         for number in range(self._count):
             header, outcome, _ = self._own[number] if self._own else (self._header, "", None)
-            records, name = self._records(number), f"episode_{number} of {_MAIN}"
+            where = f"episode_{number}"
+            records, name = self._records(where), f"{where} of {_MAIN}"
             yield base.ExchangeEpisode(header=header, records=records, name=name, outcome=outcome)
 
-    def _columns(self, file: Any, number: int) -> dict[str, Any]:
+    def _columns(self, file: Any, where: str) -> dict[str, Any]:
         """Return the columns of an episode; refuse columns that do not fit together."""
-        where, arrays = f"episode_{number}", _arrays(file, number)
+        arrays = _arrays(file, where)
         sizes = {_TERMINATED: 1, _TRUNCATED: 1, _REWARD: 1, **self._action, **self._state}
-        images = [self._image] if self._image else []
-        infos = [_STEP, *([_FRAME] if images else [])] if self._own else []
-        names = [*sizes, *infos, *images]
+        infos = [_STEP, *([_FRAME] if self._images else [])] if self._own else []
+        names = [*sizes, *infos, *self._images]
         if missing := [name for name in names if name not in arrays]:
             raise DemosError(f"{where} has no {missing[0]!r} that is an array in this file.")
         others = sorted(name for name in arrays if name.startswith("infos/"))
@@ -275,35 +274,34 @@ class _Dataset:
             # The last observation follows the last step.
             if len(one) not in {steps, steps + name.startswith(_OBSERVATIONS)}:
                 raise DemosError(f"{where}: {name!r} has {len(one)} entries for {steps} steps.")
-            numeric = one.dtype.kind in "biuf" and math.prod(one.shape[1:]) == sizes.get(name)
-            if name in sizes and not numeric:
-                raise DemosError(f"{where}: {name!r} does not have {sizes[name]} numbers in a row.")
-            is_jpeg = len(one.shape) <= 2  # Minari pads them to one length.
-            is_whole = one.shape[1:] == self._shape and one.dtype == np.uint8
-            if name in images and not is_jpeg and not is_whole:
-                raise DemosError(f"{where}: {name!r} has images that do not fit their space.")
+            shape, fits = one.shape[1:], True
+            if name in sizes:
+                fits = one.dtype.kind in "biuf" and math.prod(shape) == sizes[name]
+            elif name in self._images and len(shape) > 1:  # Others are JPEGs, padded or not.
+                fits = one.dtype == np.uint8 and shape == self._images[name].shape
+            if not fits:
+                raise DemosError(f"{where}: {name!r} has {one.dtype} {shape}, unlike its space.")
         stated = file[where].attrs.get("total_steps", steps)
         if not np.array_equal(np.ravel(stated), [steps]):
             raise DemosError(f"{where} has {steps} steps, but its total_steps is {stated}.")
         # HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
-        self._claimed += 3 * steps
-        if self._claimed > self._most:
-            raise DemosError(f"{_MAIN} claims at least {self._claimed} values, but is smaller.")
+        self._values -= 3 * steps
+        if self._values < 0:
+            raise DemosError(f"{_MAIN} claims at least {3 * steps} values, but is smaller.")
         return columns
 
-    def _records(self, number: int) -> Iterator[base.ExchangeRecord]:
+    def _records(self, where: str) -> Iterator[base.ExchangeRecord]:
         with _opened(self._main) as file:
-            columns = self._columns(file, number)
+            columns = self._columns(file, where)
             steps, size = len(columns[_TERMINATED]), sum(one.nbytes for one in columns.values())
             chunk = max(1, min(_CHUNK, steps * MAX_UNPACKED // max(1, size)))
             for start in range(0, steps, chunk):
-                part = {name: at[start : min(start + chunk, steps)] for name, at in columns.items()}
-                for n in range(len(part[_TERMINATED])):
-                    row = {name: values[n] for name, values in part.items()}
-                    name = f"step {start + n} of episode_{number}"
+                part = [one[start : min(start + chunk, steps)] for one in columns.values()]
+                for number, values in enumerate(zip(*part, strict=True), start):
+                    name = f"step {number} of {where}"
                     try:
-                        record = self._record(row, start + n)
-                    except _BAD_JSON as error:
+                        record = self._record(dict(zip(columns, values, strict=True)), number)
+                    except (ValueError, TypeError, RecursionError, msgspec.DecodeError) as error:
                         raise DemosError(f"{_STEP} of {name} is damaged: {error}.") from error
                     record.name = name
                     yield record
@@ -320,9 +318,9 @@ class _Dataset:
         known = {"action": action, "state": state, "terminated": bool(row[_TERMINATED])}
         record = base.ExchangeRecord(step=Step.from_json(rest.step | known))
         record.marks, record.dropped = rest.marks, rest.dropped
-        if self._image:
-            record.frame, stored = int(row.get(_FRAME, number)), row[self._image]
-            record.image = _last_colours(stored) if stored.ndim > 1 else bytes(stored)
+        for name in self._images:
+            record.frame, stored = int(row.get(_FRAME, number)), row[name]
+            record.image = _last_colours(stored) if np.ndim(stored) > 1 else bytes(stored)
         return record
 
 
@@ -340,34 +338,43 @@ def _write(
     episodes: Sequence[base.ExchangeEpisode], folder: Path, context: base.ExportContext
 ) -> int:
     """Write episodes into an existing folder, as one dataset, and return the number of steps."""
-    name = context.out.name
+    name, header, place = context.out.name, episodes[0].header, folder / _DATA
+    size = header.image_size
     if not _NAME.fullmatch(name):
         better = re.sub(r"[^\w-]+", "-", name).strip("-") or "drive"
         better = context.out.with_name(f"{better}-v0")
         raise DemosError(f"A Minari dataset needs a name with a version: call it {better}.")
-    header, records = episodes[0].header, iter(episodes[0].records)
-    first = next(records)
-    grey = header.image_size is not None and is_grey(first.jpeg or b"", "of the first step")
-    space = _space_of(episodes[0], grey)
-    episodes = [replace(episodes[0], records=chain((first,), records)), *episodes[1:]]
-    storage = library(_STORAGE).MinariStorage.new(
-        (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
-        observation_space=space,
-        action_space=_box(header.action_layout),
-        data_format="hdf5",
-    )
-    total, drivers = 0, set[str]()
-    with library("h5py").File(folder / _DATA / _MAIN, "a", track_order=True) as file:
+    if size is None and not header.state_layout:
+        raise DemosError(f"{episodes[0].name} has neither images nor a state: export it to csv.")
+    if size is not None and min(size) < _MIN_JPEG:
+        text = "Minari stores no images of {} x {} pixels as JPEG".format(*size)
+        raise DemosError(f"{text}: export {episodes[0].name} to csv or lerobot.")
+    place.mkdir()
+    total, drivers, greys = 0, set[str](), set[bool]()
+    with library("h5py").File(place / _MAIN, "w", track_order=True) as file:
         for number, episode in enumerate(episodes):
             group = file.create_group(f"episode_{number}")
-            steps = _write_episode(group, episode, grey)
+            steps = _write_episode(group, episode, greys)
             group.attrs.update({"id": number, "total_steps": len(steps)})
             if episode.header.seed is not None:
                 group.attrs["seed"] = episode.header.seed
             drivers.update(step.driver for step in steps)
             total += len(steps)
+    observed = dict[str, spaces.Space[Any]]()
+    if size is not None:
+        shape = size[::-1] if True in greys else (*size[::-1], 3)
+        observed["image"] = spaces.Box(0, 255, shape, np.uint8)
+    if states := header.state_layout:
+        observed["state"] = spaces.Box(states.low, states.high, dtype=np.float64)
+    space = spaces.Dict(observed) if len(observed) > 1 else next(iter(observed.values()))
+    acted = spaces.Box(header.action_layout.low, header.action_layout.high, dtype=np.float64)
+    as_text = library("minari.serialization").serialize_space
     own = [episode.header.to_json() | {"outcome": episode.outcome} for episode in episodes]
     about: dict[str, Any] = {
+        "data_format": "hdf5",
+        "jpeg_encoding": True,
+        "observation_space": as_text(space),
+        "action_space": as_text(acted),
         "dataset_id": name,
         "minari_version": version("minari"),
         "algorithm_name": ", ".join(sorted(drivers)),
@@ -378,7 +385,7 @@ def _write(
         _OURS: {"format": 1, "episodes": own},
         "total_episodes": len(episodes),
         "total_steps": total,
-        "dataset_size": storage.get_size(),
+        "dataset_size": round((place / _MAIN).stat().st_size / 1e6, 1),  # Megabytes.
     }
     envs = [(episode.header.env, episode.header.env_kwargs) for episode in episodes]
     if header.env in gym.registry and all(env == envs[0] for env in envs):
@@ -386,37 +393,16 @@ def _write(
         spec.kwargs.update(header.env_kwargs)
         about["env_spec"] = spec.to_json()
     if people := {episode.header.driver for episode in episodes if episode.header.driver}:
-        about["author"] = people
-    storage.update_metadata(about)
+        about["author"] = sorted(people)
+    (place / _METADATA).write_text(json.dumps(about))
     return total
 
 
-def _box(layout: Layout) -> spaces.Box:
-    return spaces.Box(layout.low, layout.high, dtype=np.float64)
-
-
-def _space_of(episode: base.ExchangeEpisode, grey: bool) -> spaces.Space[Any]:
-    """Return the space of all observations."""
-    header, found = episode.header, dict[str, spaces.Space[Any]]()
-    if header.image_size is not None:
-        width, height = header.image_size
-        if min(width, height) < _MIN_JPEG:
-            text = f"Minari stores no images of {width} x {height} pixels as JPEG"
-            raise DemosError(f"{text}: export {episode.name} to csv or lerobot.")
-        shape = (height, width) if grey else (height, width, 3)
-        found["image"] = spaces.Box(0, 255, shape, np.uint8)
-    if header.state_layout:
-        found["state"] = _box(header.state_layout)
-    if not found:
-        raise DemosError(f"{episode.name} has neither images nor a state: export it to csv.")
-    return spaces.Dict(found) if len(found) > 1 else next(iter(found.values()))
-
-
-def _write_episode(group: Any, episode: base.ExchangeEpisode, grey: bool) -> list[Step]:
+def _write_episode(group: Any, episode: base.ExchangeEpisode, greys: set[bool]) -> list[Step]:
     """Write the columns of an episode to its group, and return its steps.
 
-    The last observation is repeated. An episode without an end is truncated at its last step, so
-    that learners do not treat the next episode as its continuation.
+    An episode without an end is truncated at its last step, so that learners do not treat the next
+    episode as its continuation. Whether images are grey is added to `greys`.
     """
     h5py, header = library("h5py"), episode.header
     steps, rests, frames = list[Step](), list[str](), list[int]()
@@ -431,17 +417,21 @@ def _write_episode(group: Any, episode: base.ExchangeEpisode, grey: bool) -> lis
             made[:] = values
         return made
 
-    images = column(image_at, h5py.vlen_dtype(np.uint8)) if has_images else None
+    def show(jpeg: bytes) -> None:
+        images.resize(len(images) + 1, axis=0)
+        images[-1] = np.frombuffer(jpeg, np.uint8)
+
+    images: Any = column(image_at, h5py.vlen_dtype(np.uint8)) if has_images else None
     jpeg, frame = b"", -1
     for record, pixels in base.decoded_images(episode, "Minari"):
         if pixels is not None:
             frame, jpeg = frame + 1, record.jpeg or b""
             where = f"of step {len(steps)} of {episode.name}"
-            if is_grey(jpeg, where) != grey:
+            greys.add(is_grey(jpeg, where))
+            if len(greys) > 1:
                 raise DemosError(f"Minari needs grey or coloured images, and not both {where}.")
-        if images is not None:
-            images.resize(len(images) + 1, axis=0)
-            images[-1] = np.frombuffer(jpeg, np.uint8)
+        if has_images:
+            show(jpeg)
         steps.append(record.step)
         rest = {n: v for n, v in record.step.to_json().items() if n not in _IN_COLUMNS}
         rests.append(json.dumps({"step": rest, "marks": record.marks, "dropped": record.dropped}))
@@ -457,9 +447,8 @@ def _write_episode(group: Any, episode: base.ExchangeEpisode, grey: bool) -> lis
     if header.state_layout:
         states = [step.state for step in (*steps, last)]
         column(state_at, np.float64, states, (header.state_layout.size,))
-    if images is not None:
-        images.resize(len(images) + 1, axis=0)
-        images[-1] = images[-2]
+    if has_images:
+        show(jpeg)
         column(_FRAME, np.int64, frames)
     return steps
 
@@ -468,10 +457,9 @@ FORMAT: Final = base.Format(
     name="minari",
     title="Minari",
     sign=f"{_DATA}/{_METADATA}",
-    detect=lambda folder: _data_folder(folder) is not None,
+    detect=lambda folder: _metadata_of(folder) is not None,
     read=lambda folder, context: _Dataset(folder, context).read(),
     write=_write,
     options=frozenset({"hz", "dropped"}),
-    common=("action_layout", "state_layout", "image_size", "control_hz"),
     consecutive=True,
 )

@@ -49,7 +49,6 @@ _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
 _NUMBERS: Final = ("float", "int", "boolean")
 _PICTURES: Final = ("image_array", "image")
-_DEPTH: Final = "gray16_array"
 
 Fields = dict[str, Any]
 Axis = Annotated[float, Meta(ge=-1.0, le=1.0)] | None
@@ -120,6 +119,7 @@ def _read_v1(folder: Path, context: base.ImportContext) -> _Tub:
 
 
 def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
+    """Read the catalogs that the manifest names, in the order of the records' `_index`."""
     path = folder / _MANIFEST
     lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
     kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
@@ -128,23 +128,10 @@ def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
     )
     if len(set(catalogs.paths)) < len(catalogs.paths):
         raise DemosError(f"{path} names a catalog twice in its paths.")
-    return _Tub(
-        inputs=inputs,
-        types=types,
-        rate=dict(metadata).get(_LOOP_HZ),
-        records=_catalogued(folder, catalogs, context),
-        deleted=catalogs.deleted_indexes,
-    )
-
-
-def _catalogued(
-    folder: Path, catalogs: _Catalogs, context: base.ImportContext
-) -> dict[int, Fields]:
-    """Return the fields of the records in the catalogs, by their `_index`, in its order."""
     found: dict[int, list[Fields]] = {}
     for name in catalogs.paths:
         try:
-            lines = files.read_bytes(files.inside(folder, name, folder / _MANIFEST)).split(b"\n")
+            lines = files.read_bytes(files.inside(folder, name, path)).split(b"\n")
         except DemosError as error:
             context.report("left out", str(error).removesuffix("."), name)
             continue
@@ -152,8 +139,10 @@ def _catalogued(
             try:
                 if line.strip():
                     fields: Fields = files.parse_json(line, name, Fields)
-                    found.setdefault(msgspec.convert(fields["_index"], int), []).append(fields)
-            except (DemosError, LookupError, msgspec.ValidationError):
+                    found.setdefault(files.converted(fields.get("_index"), int, name), []).append(
+                        fields
+                    )
+            except DemosError:
                 reason = "damaged JSON, or no valid _index"
                 context.report("left out", reason, f"{name}, line {number}")
     numbers = sorted(found)
@@ -161,15 +150,19 @@ def _catalogued(
         text = "The _index does not always rise: the records are read in its order."
         context.report("warning", text)
     last = max([*numbers, catalogs.current_index - 1])
-    if (missing := last + 1 - len(numbers)) > 0:
-        context.report("note", f"{missing} of the records 0 to {last} are in no catalog.")
     if strange := [number for number in catalogs.deleted_indexes if number > last]:
         text = f"{len(strange)} of the deleted indexes belong to no record: {base.few(strange)}."
         context.report("warning", text)
     for number in numbers:
         if len(found[number]) > 1:
             context.report("left out", "the _index of several records", f"record {number}")
-    return {number: found[number][0] for number in numbers if len(found[number]) == 1}
+    return _Tub(
+        inputs=inputs,
+        types=types,
+        rate=dict(metadata).get(_LOOP_HZ),
+        records={number: found[number][0] for number in numbers if len(found[number]) == 1},
+        deleted=catalogs.deleted_indexes,
+    )
 
 
 def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEpisode]:
@@ -178,21 +171,14 @@ def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEp
     tub = (_read_v2 if is_v2 else _read_v1)(folder, context)
     if len(tub.inputs) != len(tub.types):
         raise DemosError(f"{folder} has {len(tub.inputs)} inputs, but {len(tub.types)} types.")
-    types, deleted, found = (
-        dict(zip(tub.inputs, tub.types, strict=True)),
-        {*tub.deleted},
-        tub.records,
-    )
-    kept = {number: fields for number, fields in found.items() if number not in deleted}
-    if gone := len(found) - len(kept):
+    types = dict(zip(tub.inputs, tub.types, strict=True))
+    kept = {n: fields for n, fields in tub.records.items() if n not in {*tub.deleted}}
+    if gone := len(tub.records) - len(kept):
         context.report("note", f"Records that are deleted in the tub are not imported: {gone}.")
     there = list(dict.fromkeys(name for fields in kept.values() for name in fields))
     cameras = [name for name in there if types.get(name) in _PICTURES or name == _IMAGE]
     camera = _IMAGE if _IMAGE in cameras and not context.camera else ""
     camera = camera or base.choose_camera(folder, cameras, context)
-    if not camera and _DEPTH in map(types.get, there):
-        text = "The steps have no images, because those of 16 bits are not imported."
-        context.report("warning", text)
     numeric = [name for name, kind in types.items() if name and kind in _NUMBERS]
     sensed = [name for name in numeric if not name.startswith(("user/", "pilot/", "_"))]
     taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
@@ -204,15 +190,15 @@ def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEp
         _find_images(records, [one.get(camera) for one in kept.values()], images, context)
     sessions = {number: str(fields.get("_session_id", "")) for number, fields in kept.items()}
     parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
+    states = [feature for name in sensed for feature in base.features_of(name, 1)]
     header = EpisodeHeader(
         action_layout=_ACTIONS,
-        state_layout=Layout(tuple(base.features_of(name, 1)[0] for name in sensed)),
+        state_layout=Layout(tuple(states)),
         body="car",
         source="tub",
     )
     rate = _float(tub.rate)
-    stated_hz = rate if 0.0 < rate < math.inf else None
-    for part, head in base.drives(parts, header, context, stated_hz):
+    for part, head in base.drives(parts, header, context, rate if 0.0 < rate < math.inf else None):
         if head.clock == "real" and tub.is_unix:
             for record in part:
                 record.step = structs.replace(record.step, wall_ns=record.step.captured_ns)
@@ -284,41 +270,44 @@ def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.Expor
     Actions of people, experts and programs are written as `user/...`, those of policies as
     `pilot/...`.
     """
-    action, states = episodes[0].header.action_layout, episodes[0].header.state_layout
-    if action.names != _ACTIONS.names or states.size != len(states):
-        text = f"a tub has the action {', '.join(_ACTIONS.names)}, and a state of single numbers"
-        raise DemosError(f"{episodes[0].name} does not fit: {text}; export it to minari or csv.")
-    state = states.names
+    states = episodes[0].header.state_layout
     (folder / _IMAGES).mkdir()
     records: list[Fields] = []
-    began = [_began(episode.header) for episode in episodes]
-    sessions = [f"{at:%y-%m-%d}_{number}" for number, at in enumerate(began)]
-    for episode, at, session in zip(episodes, began, sessions, strict=True):
+    sessions: list[str] = []
+    for episode in episodes:
+        header = episode.header
+        fits = header.action_layout.names == _ACTIONS.names and header.state_layout == states
+        if not fits or states.size != len(states):
+            text = f"a tub has the action {', '.join(_ACTIONS.names)}, and a state of the same "
+            text += "single numbers in all episodes"
+            raise DemosError(f"{episode.name} does not fit: {text}; export it to minari or csv.")
+        at = _began(header)
+        sessions.append(f"{at:%y-%m-%d}_{len(sessions)}")
         for step, jpeg, time_ns in _timed(episode, round(at.timestamp() * _NS_PER_S)):
-            index, fields = len(records), _fields(step, state, episode.name)
+            index, fields = len(records), _fields(step, states.names, episode.name)
             if jpeg is None:
                 raise DemosError(f"A step of {episode.name} has no image: export it to csv.")
             name = f"{index}_cam_image_array_.jpg"
             (folder / _IMAGES / name).write_bytes(jpeg)
-            fields |= {_IMAGE: name, "_session_id": session, "_index": index}
+            fields |= {_IMAGE: name, "_session_id": sessions[-1], "_index": index}
             records.append(fields | {"_timestamp_ms": round(time_ns / _NS_PER_MS)})
-    created_s = began[0].timestamp()
+    created = {"created_at": _began(episodes[0].header).timestamp()}
     paths: list[str] = []
     for start in range(0, len(records), _CATALOG_LENGTH):
         part = records[start : start + _CATALOG_LENGTH]
         lines = [json.dumps(one, allow_nan=False, sort_keys=True) + "\n" for one in part]
         paths.append(f"catalog_{len(paths)}.catalog")
         (folder / paths[-1]).write_text("".join(lines), encoding="utf-8", newline="\n")
-        lengths = {"line_lengths": list(map(len, lines)), "created_at": created_s}
-        kept = lengths | {"path": f"{paths[-1]}_manifest", "start_index": start}
+        kept = {"line_lengths": list(map(len, lines)), **created}
+        kept |= {"path": f"{paths[-1]}_manifest", "start_index": start}
         (folder / f"{paths[-1]}_manifest").write_text(json.dumps(kept) + "\n")
     types = {_IMAGE: "image_array", _MODE: "str"}
-    types |= dict.fromkeys((*_USER, *_PILOT, *state), "float")
+    types |= dict.fromkeys((*_USER, *_PILOT, *states.names), "float")
     rates = {episode.header.control_hz for episode in episodes}
     metadata = {_LOOP_HZ: f"{rates.pop():g}"} if len(rates) == 1 else {}
     named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
     catalogs = {"paths": paths, "current_index": len(records), "max_len": _CATALOG_LENGTH}
-    more = {"created_at": created_s, "sessions": named}
+    more = {**created, "sessions": named}
     ends = (list(types), list(types.values()), metadata, more, catalogs | {"deleted_indexes": []})
     (folder / _MANIFEST).write_text("".join(json.dumps(line) + "\n" for line in ends))
     return len(records)
@@ -375,5 +364,4 @@ FORMAT: Final = base.Format(
     read=_read,
     write=_write,
     options=frozenset({"camera", "hz"}),
-    common=("action_layout", "state_layout"),
 )
