@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, cast
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 import numpy as np
@@ -27,13 +27,7 @@ from numpy.typing import NDArray
 from shapechanger.demos.episodes import Driver, EpisodeHeader
 from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES, MAX_TEXT_BYTES
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
-from shapechanger.errors import (
-    DemosError,
-    LayoutError,
-    MissingExtra,
-    OutputError,
-    translate_errors,
-)
+from shapechanger.errors import DemosError, LayoutError, MissingExtra, OutputError, translate_errors
 from shapechanger.files import read_file, writing
 
 MAX_UNPACKED: Final = 64 << 20
@@ -130,31 +124,26 @@ def read_table(path: Path) -> list[tuple[int, list[str]]]:
         raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
 
 
-def load_jpeg(
-    image: Path | bytes | NDArray[np.uint8], decoded: tuple[int, int] | None = None
-) -> tuple[bytes, tuple[int, int]]:
+def load_jpeg(image: Path | bytes | NDArray[np.uint8]) -> tuple[bytes, tuple[int, int]]:
     """Return an intact image as JPEG, with its width and height; others get quality 100.
 
     Args:
         image: A file or its content, as JPEG, PNG or BMP; or pixels, shape (height, width, 3).
-        decoded: Its size if it was decoded before, so that a JPEG is not decoded again.
 
     Raises:
         DemosError: If it is missing, damaged, of another kind, or too large; a noun with a reason.
     """
     if isinstance(image, np.ndarray):
         return encode_picture(image), (image.shape[1], image.shape[0])
-    with translate_errors(
-        OSError, to=lambda error: DemosError(f"an image that cannot be read ({error.strerror})")
-    ):
+    try:
         data = read_file(image, MAX_PICTURE_BYTES) if isinstance(image, Path) else image
+    except OSError as error:
+        raise DemosError(f"an image that cannot be read ({error.strerror})") from error
     if not data.strip(b"\0"):
         raise DemosError("an empty image")
     if len(data) > MAX_PICTURE_BYTES:
         raise DemosError(f"an image of more than {MAX_PICTURE_BYTES} bytes")
     is_jpeg = data.startswith(_JPEG)
-    if is_jpeg and decoded:
-        return data, decoded
     if not is_jpeg and not data.startswith((_PNG, b"BM")):
         raise DemosError("an image that is not JPEG, PNG or BMP")
     if data.startswith(_PNG) and data[_PNG_DEPTH] == b"\x10":
@@ -224,12 +213,12 @@ def own_episodes(
         with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
             header = EpisodeHeader.from_json(fields)
         runs: _Runs = converted(fields.get("drivers", []), _Runs, where)
-        drivers = chain.from_iterable(repeat(driver, count) for driver, count in runs)
-        outcome = str(fields.get("outcome", ""))
-        episodes.append((header, outcome, cast("Iterator[Driver]", drivers)))
+        drivers = chain.from_iterable(repeat(*run) for run in runs)
+        episodes.append((header, str(fields.get("outcome", "")), drivers))
     kinds = {(h.action_layout.size, h.state_layout.size, h.image_size) for h, *_ in episodes}
-    if found is not None:
-        kinds.add((found.action_layout.size, found.state_layout.size, found.image_size))
-    if len(episodes) != count or (found is not None and len(kinds) > 1):
+    kinds |= (
+        {(found.action_layout.size, found.state_layout.size, found.image_size)} if found else set()
+    )
+    if len(episodes) != count or (found and len(kinds) > 1):
         raise DemosError(f"{where} is of another dataset: remove it if the dataset was edited.")
     return episodes

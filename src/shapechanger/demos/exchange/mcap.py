@@ -32,18 +32,25 @@ _NS_PER_S: Final = 10**9
 _TEXT, _WHOLE, _NUMBER, _FLAG = (
     {"type": kind} for kind in ("string", "integer", "number", "boolean")
 )
-_REWARD: Final[dict[str, Any]] = {"reward": _NUMBER, "terms": {"type": "object"}}
-_STEP: Final[dict[str, Any]] = {
-    **dict.fromkeys(("step", "wall_ns"), _WHOLE),
-    **dict.fromkeys(("driver", "stop_reason", "dropped"), _TEXT),
-    **dict.fromkeys(("terminated", "truncated"), _FLAG),
-    "marks": {"type": "array", "items": _TEXT},
+_SCHEMAS: Final[dict[str, dict[str, Any]]] = {
+    "reward": {"reward": _NUMBER, "terms": {"type": "object"}},
+    "step": {
+        **dict.fromkeys(("step", "wall_ns"), _WHOLE),
+        **dict.fromkeys(("driver", "stop_reason", "dropped"), _TEXT),
+        **dict.fromkeys(("terminated", "truncated"), _FLAG),
+        "marks": {"type": "array", "items": _TEXT},
+    },
+    # Foxglove's own, by which its panels know an image: github.com/foxglove/foxglove-sdk.
+    "camera": {
+        "timestamp": {"type": "object", "properties": {"sec": _WHOLE, "nsec": _WHOLE}},
+        **dict.fromkeys(("frame_id", "format"), _TEXT),
+        "data": {"type": "string", "contentEncoding": "base64"},
+    },
 }
-# Foxglove's own, by which its panels know an image: github.com/foxglove/foxglove-sdk.
-_IMAGE: Final[dict[str, Any]] = {
-    "timestamp": {"type": "object", "properties": {"sec": _WHOLE, "nsec": _WHOLE}},
-    **dict.fromkeys(("frame_id", "format"), _TEXT),
-    "data": {"type": "string", "contentEncoding": "base64"},
+_KINDS: Final = {
+    "camera": "foxglove.CompressedImage",
+    **{topic: f"shapechanger.{topic.title()}" for topic in ("state", "reward", "step")},
+    **dict.fromkeys(("action", "applied", "wanted"), "shapechanger.Action"),
 }
 
 
@@ -63,19 +70,14 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
 
 
 def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
-    header, steps = episode.header, 0
+    header, steps, channels = episode.header, 0, dict[str, int]()
     layouts = {"state": header.state_layout} if header.state_layout else {}
     layouts |= dict.fromkeys(("action", "applied", "wanted"), header.action_layout)
-    schemas = {topic: _properties(layout) for topic, layout in layouts.items()}
-    schemas |= {"reward": _REWARD, "step": _STEP}
-    if header.image_size is not None:
-        schemas["camera"] = _IMAGE
-    channels: dict[str, int] = {}
+    schemas = {topic: _properties(layout) for topic, layout in layouts.items()} | _SCHEMAS
     for topic, properties in schemas.items():
-        kind = "Action" if topic in {"applied", "wanted"} else topic.title()
-        name = "foxglove.CompressedImage" if topic == "camera" else f"shapechanger.{kind}"
-        schema = {"title": name, "type": "object", "properties": properties}
-        number = writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
+        schema = {"title": _KINDS[topic], "type": "object", "properties": properties}
+        text = json.dumps(schema).encode()
+        number = writer.register_schema(_KINDS[topic], "jsonschema", text)
         channels[topic] = writer.register_channel(f"/{topic}", "json", number)
     period_ns = round(_NS_PER_S / header.control_hz)
     seen_ns, shown = -period_ns, None
@@ -108,11 +110,10 @@ def _messages(
     if step.reward is not None:
         terms = {name: _known(value) for name, value in step.terms.items()}
         yield "reward", {"reward": _known(step.reward), "terms": terms}
-    always = {name: getattr(step, name) for name in ("driver", "terminated", "truncated")}
-    more = {"stop_reason": step.stop_reason or None, "wall_ns": step.wall_ns}
-    more |= {"marks": list(record.marks) or None, "dropped": record.dropped}
-    known = {name: value for name, value in more.items() if value is not None}
-    yield "step", {"step": step.index} | always | known
+    plain = {name: value for name, value in step.to_json().items() if name in _SCHEMAS["step"]}
+    plain |= {"terminated": step.terminated, "truncated": step.truncated}
+    plain |= {"marks": record.marks} if record.marks else {}
+    yield "step", plain | ({} if record.dropped is None else {"dropped": record.dropped})
 
 
 def _properties(layout: Layout) -> dict[str, Any]:
@@ -121,9 +122,8 @@ def _properties(layout: Layout) -> dict[str, Any]:
     for feature in layout:
         ends = ("" if math.isinf(end) else f"{end:g}" for end in (feature.low, feature.high))
         about = {"description": f"[{feature.unit}] {' to '.join(ends)}".rstrip()}
-        found[feature.name] = about | (
-            {"type": "array", "items": _NUMBER} if feature.shape else _NUMBER
-        )
+        kind = {"type": "array", "items": _NUMBER} if feature.shape else _NUMBER
+        found[feature.name] = about | kind
     return found
 
 
