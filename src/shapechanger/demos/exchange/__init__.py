@@ -1,10 +1,9 @@
 """Import and export of recordings in other formats.
 
 A format is one file: it reads folders into `ExchangeEpisode`s, writes these, and declares a
-`Format` (`base`); `formats` finds our own and those of the entry points `shapechanger.formats`.
-`base.COLUMNS` names each column of a step. `files` and `video` load and check what strangers
-made, within one budget. What is not whole is left out here, with its name and the reason. Sources
-are never changed, and targets appear atomically.
+`Format` (`base`). `base.COLUMNS` names each column of a step. `files` and `video` load and check
+what strangers made. What is not whole is left out here, with its name and the reason. Sources are
+never changed, and targets appear atomically.
 """
 
 from __future__ import annotations
@@ -273,26 +272,26 @@ def import_recording(
     """
     context = ImportContext(camera=camera, hz=hz, strict=strict)
     found, read = _read(path, format, context)
-    episodes = steps = pictures = 0
+    counts: list[tuple[int, int]] = []
     now = datetime.now(UTC)
     with new_folder(out, path) as folder:
         for episode in read:
-            if not episodes:  # One time begins the names of all folders, so that order is kept.
+            if not counts:  # One time begins the names of all folders, so that order is kept.
                 with suppress(ValueError):
                     now = datetime.fromisoformat(episode.header.created).astimezone(UTC)
-            added, shown = _write(episode, folder, now, context)
-            episodes, steps, pictures = episodes + bool(added), steps + added, pictures + shown
-        if not episodes:
+            counts += _write(episode, folder, now, context)
+        if not counts:
             about = [f"{kind}: {text}".removesuffix(".") for kind, text in context.findings]
             raise DemosError(f"There is nothing to import in {path} ({'; '.join(about)}).")
-    return Converted(found, episodes, steps, pictures, context.findings)
+    steps, pictures = map(sum, zip(*counts, strict=True))
+    return Converted(found, len(counts), steps, pictures, context.findings)
 
 
 def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterator[ExchangeEpisode]]:
     """Return the format of a folder, and an iterator over its episodes of whole records."""
-    names = [name for name, form in formats().items() if form.read]
-    if format not in {"auto", *names}:
-        raise UnknownName("format", format, ("auto", *names))
+    names = ["auto", *(name for name, form in formats().items() if form.read)]
+    if format not in names:
+        raise UnknownName("format", format, names)
     form = formats()[find_format(path) if format == "auto" else format]
     if form.name not in _formats_of(path):
         raise DemosError(f"{path} is not {format}: expected {form.sign}; or omit --format.")
@@ -331,11 +330,12 @@ def _formats_of(path: Path) -> list[str]:
 
 def _write(
     episode: ExchangeEpisode, folder: Path, now: datetime, context: ImportContext
-) -> tuple[int, int]:
-    """Write one episode of a recording, or leave it out; return its numbers of steps and images."""
+) -> list[tuple[int, int]]:
+    """Write one episode of a recording; return its numbers of steps and images, [] without any."""
     excluded: dict[int, str] = {}
-    pictures, shown, created, writer = 0, None, episode.header.created, None
+    pictures, shown, writer = 0, None, None
     try:
+        created = episode.header.created
         with EpisodeWriter.create(folder, episode.header, now=now, created=created) as writer:
             for record in episode.records:
                 index = writer.add(record.step, record.jpeg)
@@ -348,20 +348,19 @@ def _write(
                 if writer.is_full:
                     raise DemosError("longer than an episode may be, about an hour at 100 Hz.")
             writer.close(episode.outcome)
-    except DemosError as error:
-        if context.strict:
-            raise
-        text = str(error).removesuffix(".")
-        text = text if writer is None else text.replace(str(writer.path), "the episode")
-        context.report("left out", text, episode.name)
-    else:
         # Consecutive steps that were dropped for one reason become one line.
         runs = groupby(enumerate(excluded.items()), key=lambda it: (it[1][1], it[1][0] - it[0]))
         for (why, _), run in runs:
             indexes = [index for _, (index, _) in run]
             edit(writer.path, Drop(indexes[0], indexes[-1], why))
         if writer.steps:
-            return writer.steps, pictures
+            return [(writer.steps, pictures)]
+    except DemosError as error:
+        if context.strict:
+            raise
+        text = str(error).removesuffix(".")
+        text = text if writer is None else text.replace(str(writer.path), "the episode")
+        context.report("left out", text, episode.name)
     if writer is not None:
         shutil.rmtree(writer.path)
-    return 0, 0
+    return []

@@ -13,7 +13,7 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import chain, repeat
@@ -157,6 +157,19 @@ def load_jpeg(image: Path | bytes | NDArray[np.uint8]) -> tuple[bytes, tuple[int
     if pixels is None:
         raise DemosError(f"an image that is partly transparent, or above {MAX_PIXELS} pixels")
     return data if is_jpeg else encode_picture(pixels), (pixels.shape[1], pixels.shape[0])
+
+
+def image_size(shape: Sequence[int], channels: Sequence[int] = (1, 3)) -> tuple[int, int] | None:
+    """Return the width and height of images by the shape of their pixels, colours first or last.
+
+    None for a shape of other arrays, or of more than `MAX_PIXELS`.
+    """
+    if len(shape) not in {2, 3}:
+        return None
+    is_last = len(shape) == 2 or shape[-1] in channels
+    height, width, *colours = shape if is_last else (*shape[1:], shape[0])
+    fits = height * width <= MAX_PIXELS and (not colours or colours[0] in channels)
+    return (width, height) if fits else None
 
 
 def _pixels(data: bytes) -> NDArray[np.uint8] | None:

@@ -1,9 +1,7 @@
 """LeRobot datasets, version 3: our own with their layouts, and those of others.
 
-Of a dataset of others, `action` becomes the action, the numbers of `observation.*` become the
-state, and one camera the image. Units are unknown and written "?", unless the feature states
-them, and the driver is taken to be a person, who teleoperated the robot. Images that are stored
-as JPEG are kept; videos and PNGs are encoded as JPEG of quality 100, which changes them slightly.
+Of a dataset of others, `action` becomes the action, the numbers of `observation.*` the state, and
+one camera the image; the driver is taken to be a person, who teleoperated the robot.
 
 A row is the step that its `episode_index`, `frame_index`, `index` and `timestamp` and the entry of
 its episode in `meta/episodes` agree on, and its image is the one that the video shows at that time.
@@ -30,7 +28,6 @@ from shapechanger.demos.episodes import Driver, EpisodeHeader, Step
 from shapechanger.demos.exchange import base, files
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, write
 from shapechanger.demos.exchange.video import VideoTimes, read_pictures, read_times
-from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 
@@ -45,7 +42,6 @@ _KEYS: Final = ("episode_index", "frame_index", "index", "timestamp")
 _OBSERVATION: Final = "observation."
 _CAMERAS: Final = "observation.images."
 _NUMBERS: Final = re.compile(r"bool|u?int(8|16|32|64)|float(16|32|64)")
-_CHANNELS: Final = (1, 3, 4)
 _PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}")
 _MAX_PACKED: Final = 64  # Largest ratio of unpacked bytes to bytes of a file.
 _MOST: Final = 1 << 20  # Steps of an episode, and episodes.
@@ -76,14 +72,6 @@ class _Feature(msgspec.Struct, kw_only=True):
     def is_number(self) -> bool:
         fits = len(self.shape) != 3 and self.size <= files.MAX_VALUES
         return fits and _NUMBERS.fullmatch(self.kind) is not None
-
-    def image_size(self, where: str) -> tuple[int, int]:
-        """Return the width and height of its images, pixels."""
-        shape = (*self.shape, 1, 1)[:3]
-        height, width, channels = shape if shape[-1] in _CHANNELS else (*shape[1:], shape[0])
-        if len(self.shape) < 2 or channels not in _CHANNELS or height * width > MAX_PIXELS:
-            raise DemosError(f"{where} has the shape {list(self.shape)}, not of an image.")
-        return width, height
 
 
 class _Info(msgspec.Struct, kw_only=True):
@@ -135,7 +123,10 @@ class _Dataset:
         cameras = {k.removeprefix(_CAMERAS): k for k, one in features.items() if one.is_image}
         context.camera = context.camera.removeprefix(_CAMERAS)
         camera = cameras.get(base.choose_camera(folder, list(cameras), context), "")
-        self._size = features[camera].image_size(f"{path}: {camera}") if camera else None
+        self._size = files.image_size(features[camera].shape, (1, 3, 4)) if camera else None
+        if camera and self._size is None:
+            shape = list(features[camera].shape)
+            raise DemosError(f"{path}: {camera} has the shape {shape}, not of an image.")
         self._stored = [camera] if camera and features[camera].kind == "image" else []
         self._video = f"videos/{camera}/" if camera and not self._stored else ""
         for key, one in features.items():

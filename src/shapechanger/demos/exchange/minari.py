@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange import base, files
 from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library
-from shapechanger.demos.jpeg import MAX_PIXELS, is_grey
+from shapechanger.demos.jpeg import is_grey
 from shapechanger.errors import DemosError, translate_errors
 from shapechanger.layout import Feature, Layout
 
@@ -51,7 +51,6 @@ _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
 _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
 _MIN_JPEG: Final = 32  # Pixels. Minari 0.5 stores smaller images as pixels (`is_image_space`).
-_CHANNELS: Final = (1, 3)
 _DEEP: Final = ("uint16", "int16", "uint32")
 _DESCRIPTION: Final = (
     "Episodes recorded by Shapechanger, and exported without changes: images are the recorded "
@@ -127,16 +126,8 @@ class _Space(msgspec.Struct, kw_only=True):
 
     def image_size(self) -> tuple[int, int] | None:
         """Return the width and height of its images; None if it has no images."""
-        if self.type != "Box" or self.dtype != "uint8" or len(self.shape) not in {2, 3}:
-            return None
-        height, width, *channels = self.shape[1:] if _colours_first(self.shape) else self.shape
-        is_picture = not channels or channels[0] in _CHANNELS
-        fits = min(height, width) >= _MIN_PICTURE and height * width <= MAX_PIXELS
-        return (width, height) if is_picture and fits else None
-
-
-def _colours_first(shape: Sequence[int]) -> bool:
-    return len(shape) == 3 and shape[0] in _CHANNELS and shape[2] not in _CHANNELS
+        size = files.image_size(self.shape) if (self.type, self.dtype) == ("Box", "uint8") else None
+        return size if size and min(size) >= _MIN_PICTURE else None
 
 
 def _metadata_of(folder: Path) -> Path | None:
@@ -330,7 +321,8 @@ def _numbers(row: Mapping[str, Any], names: Iterable[str]) -> list[float]:
 
 def _last_colours(stored: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return an image with its three colours last."""
-    pixels = np.moveaxis(stored, 0, -1) if _colours_first(stored.shape) else np.atleast_3d(stored)
+    pixels = np.atleast_3d(stored)
+    pixels = pixels if pixels.shape[-1] in {1, 3} else np.moveaxis(pixels, 0, -1)
     return np.repeat(pixels, 3 // pixels.shape[-1], -1)
 
 

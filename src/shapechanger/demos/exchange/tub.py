@@ -53,8 +53,7 @@ _PICTURES: Final = ("image_array", "image")
 Fields = dict[str, Any]
 Axis = Annotated[float, Meta(ge=-1.0, le=1.0)] | None
 _MAX_MS: Final = 2 * 10**12
-_IN_TIME: Final = Meta(gt=-_MAX_MS, lt=_MAX_MS)
-Time = Annotated[int, _IN_TIME] | Annotated[float, _IN_TIME] | None
+Time = Annotated[float, Meta(gt=-_MAX_MS, lt=_MAX_MS)] | None
 
 
 class _Record(Struct):
@@ -237,7 +236,7 @@ def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.Exchange
         driver="person" if by_person else "policy",
         wanted=(pilot[0] or 0.0, pilot[1] or 0.0) if by_person and None not in pilot else None,
         state=tuple(_float(fields.get(name)) for name in sensed),
-        captured_ns=None if known.time_ms is None else round(known.time_ms * _NS_PER_MS),
+        captured_ns=None if known.time_ms is None else 1000 * round(1e3 * known.time_ms),
     )
     return base.ExchangeRecord(name=f"record {number}", number=number, step=step, fault=fault)
 
