@@ -87,11 +87,7 @@ FALSE = b"false,false"
         ),
         (False, _edit("2.jpg", lambda jpeg: huge()), "line 3 of keys: a damaged image"),
         (False, _edit("2.jpg", lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
-        (
-            False,
-            _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"),
-            "line 3 of keys: it is invalid",
-        ),
+        (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"), "line 3 of keys: it is invalid"),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,nan,0.0,1.0"), "line 3 of keys: its action is"),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,,1.0"), "its action has 3 values"),
         (False, _table(b"0.0,0.0,0.0,1.0", b",,,"), "missing required field `action`"),

@@ -184,10 +184,7 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
             {"features": {CAMERA: {"dtype": "video", "shape": [16, SIZE, 3]}}},
             r"of \(32, 32\) pixels, not \(32, 16\)",
         ),
-        (
-            {"features": {CAMERA: {"dtype": "video", "shape": [7]}}},
-            "the shape .7., not",
-        ),
+        ({"features": {CAMERA: {"dtype": "video", "shape": [7]}}}, "the shape .7., not"),
         (spoil(DATA, size=300), "not an intact Parquet file"),
         (spoil(VIDEO, PLAYLIST), "episode 0.*is damaged"),
         (outside, "leaves the folder"),

@@ -154,11 +154,7 @@ def every(change: Any) -> Any:
         ({"rows": row(9, episode_index=None)}, [0], "keys of episode 1 do not fit"),
         # The entries.
         ({"places": place(0, length=7)}, [1], "keys of episode 0"),
-        (
-            {"places": place(0, length=9)},
-            [1],
-            "episode 0: .* lacks an image at the time of a step",
-        ),
+        ({"places": place(0, length=9)}, [1], "episode 0: .* lacks an image at the time of a step"),
         ({"places": place(1, dataset_from_index=7)}, [0], "keys of episode 1"),
         ({"places": lambda entries: entries[:1]}, [0], "episode 1: meta/episodes does not have it"),
         ({"places": lambda entries: entries[1:]}, [1], "episode 0: meta/episodes does not have it"),

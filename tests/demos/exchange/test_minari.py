@@ -109,11 +109,7 @@ def endless(file: h5py.File) -> None:
             "episode_1 has 4 steps, but its total_steps is 9",
         ),
         (lambda file: file.__delitem__("episode_1"), BOTH[:1], "has no episode_1"),
-        (
-            endless,
-            [[0, 1, 2, 3], [4, 5, 7]],
-            "step 2 of episode_1: its action is .inf.",
-        ),
+        (endless, [[0, 1, 2, 3], [4, 5, 7]], "step 2 of episode_1: its action is .inf."),
     ],
 )
 def test_intact_episodes_are_imported(

@@ -57,9 +57,7 @@ def test_other_images_are_named(image: bytes, reason: str) -> None:
 
 
 @settings(max_examples=25, deadline=None)
-@given(
-    shown=st.lists(st.tuples(st.sampled_from([*GOOD, *BAD]), st.booleans(), st.booleans())),
-)
+@given(shown=st.lists(st.tuples(st.sampled_from([*GOOD, *BAD]), st.booleans(), st.booleans())))
 def test_each_record_is_a_step_with_its_picture_or_left_out(
     shown: list[tuple[Any, bool, bool]],
 ) -> None:

@@ -29,12 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.base import (
-    COLUMNS,
-    ExchangeEpisode,
-    ExportContext,
-    decoded_images,
-)
+from shapechanger.demos.exchange.base import COLUMNS, ExchangeEpisode, ExportContext, decoded_images
 from shapechanger.demos.exchange.files import library
 from shapechanger.demos.exchange.video import VideoWriter
 from shapechanger.errors import DemosError

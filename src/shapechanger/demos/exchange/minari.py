@@ -396,24 +396,19 @@ def _write_episode(group: Any, episode: base.ExchangeEpisode, greys: set[bool]) 
     An episode without an end is truncated at its last step, so that learners do not treat the next
     episode as its continuation. Whether images are grey is added to `greys`.
     """
-    h5py, header = library("h5py"), episode.header
+    header, variable = episode.header, library("h5py").vlen_dtype(np.uint8)
     steps, rests, frames = list[Step](), list[str](), list[int]()
-    has_images = header.image_size is not None
-    both = has_images and bool(header.state_layout)
-    state_at, image_at = (_OBSERVATIONS + at * both for at in ("/state", "/image"))
-
-    def column(name: str, dtype: Any, values: Sequence[Any] = (), shape: Sequence[int] = ()) -> Any:
-        now, most = (len(values), *shape), (None, *shape)
-        made = group.create_dataset(name, now, dtype, maxshape=most, chunks=True)
-        if values:
-            made[:] = values
-        return made
+    is_dict = header.image_size is not None and bool(header.state_layout)
+    state_at, image_at = (_OBSERVATIONS + at * is_dict for at in ("/state", "/image"))
+    images: Any = None
+    if header.image_size is not None:
+        images = group.create_dataset(image_at, (0,), variable, maxshape=(None,), chunks=True)
 
     def show(jpeg: bytes) -> None:
-        images.resize(len(images) + 1, axis=0)
-        images[-1] = np.frombuffer(jpeg, np.uint8)
+        if images is not None:
+            images.resize(len(images) + 1, axis=0)
+            images[-1] = np.frombuffer(jpeg, np.uint8)
 
-    images: Any = column(image_at, h5py.vlen_dtype(np.uint8)) if has_images else None
     jpeg, frame = b"", -1
     for record, pixels in base.decoded_images(episode, "Minari"):
         if pixels is not None:
@@ -422,26 +417,29 @@ def _write_episode(group: Any, episode: base.ExchangeEpisode, greys: set[bool]) 
             greys.add(is_grey(jpeg, where))
             if len(greys) > 1:
                 raise DemosError(f"Minari needs grey or coloured images, and not both {where}.")
-        if has_images:
-            show(jpeg)
+        show(jpeg)
         steps.append(record.step)
         rest = {n: v for n, v in record.step.to_json().items() if n not in _IN_COLUMNS}
         rests.append(json.dumps({"step": rest, "marks": record.marks, "dropped": record.dropped}))
         frames.append(frame)
+    show(jpeg)
     last = steps[-1]
     cut = [*(step.truncated for step in steps[:-1]), last.truncated or not last.terminated]
     rewards = [math.nan if step.reward is None else step.reward for step in steps]
-    column(_ACTION, np.float64, [step.action for step in steps], (header.action_layout.size,))
-    column(_REWARD, np.float64, rewards)
-    column(_TERMINATED, np.bool_, [step.terminated for step in steps])
-    column(_TRUNCATED, np.bool_, cut)
-    column(_STEP, h5py.string_dtype("utf-8"), rests)
+    columns = {
+        _ACTION: np.array([step.action for step in steps], np.float64),
+        _REWARD: np.array(rewards, np.float64),
+        _TERMINATED: np.array([step.terminated for step in steps]),
+        _TRUNCATED: np.array(cut),
+        _STEP: np.array(rests, library("h5py").string_dtype("utf-8")),
+    }
     if header.state_layout:
-        states = [step.state for step in (*steps, last)]
-        column(state_at, np.float64, states, (header.state_layout.size,))
-    if has_images:
-        show(jpeg)
-        column(_FRAME, np.int64, frames)
+        columns[state_at] = np.array([step.state for step in (*steps, last)], np.float64)
+    if images is not None:
+        columns[_FRAME] = np.array(frames, np.int64)
+    for name, values in columns.items():
+        most = (None, *values.shape[1:])
+        group.create_dataset(name, data=values, maxshape=most, chunks=True)
     return steps
 
 
