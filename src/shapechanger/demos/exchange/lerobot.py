@@ -51,8 +51,6 @@ _Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e5)]
 
 
 class _Feature(msgspec.Struct, kw_only=True):
-    """A feature of `info.json`."""
-
     kind: str = msgspec.field(name="dtype")
     shape: tuple[Annotated[int, msgspec.Meta(ge=1)], ...]
     names: Any = None
@@ -75,8 +73,6 @@ class _Feature(msgspec.Struct, kw_only=True):
 
 
 class _Info(msgspec.Struct, kw_only=True):
-    """`info.json`."""
-
     codebase_version: str
     fps: Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
     features: dict[str, _Feature]
@@ -101,8 +97,6 @@ class _Entry(msgspec.Struct, kw_only=True):
 
 
 class _Dataset:
-    """A dataset that is read."""
-
     def __init__(self, folder: Path, context: base.ImportContext) -> None:
         self._folder, self._context, path = folder, context, folder / INFO
         self._info: _Info = files.read_json(path, _Info)

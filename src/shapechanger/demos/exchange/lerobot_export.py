@@ -70,8 +70,6 @@ def write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCont
 
 
 class _Dataset:
-    """A dataset that is being written."""
-
     def __init__(self, header: EpisodeHeader, folder: Path, context: ExportContext) -> None:
         self.steps = 0
         self._arrow = library("pyarrow", "lerobot")

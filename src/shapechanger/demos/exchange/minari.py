@@ -162,8 +162,6 @@ def _arrays(file: Any, name: str) -> dict[str, Any]:
 
 
 class _Dataset:
-    """A dataset that is read."""
-
     def __init__(self, folder: Path, context: base.ImportContext) -> None:
         path = _metadata_of(folder) or folder / _METADATA
         about: _Metadata = files.read_json(path, _Metadata)

@@ -129,12 +129,8 @@ def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
         raise DemosError(f"{path} names a catalog twice in its paths.")
     found: dict[int, list[Fields]] = {}
     for name in catalogs.paths:
-        try:
-            lines = files.read_bytes(files.inside(folder, name, path)).split(b"\n")
-        except DemosError as error:
-            context.report("left out", str(error).removesuffix("."), name)
-            continue
-        for number, line in enumerate(lines, 1):
+        text = files.read_bytes(files.inside(folder, name, path))
+        for number, line in enumerate(text.split(b"\n"), 1):
             try:
                 if line.strip():
                     fields: Fields = files.parse_json(line, name, Fields)
@@ -144,22 +140,18 @@ def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
             except DemosError:
                 reason = "damaged JSON, or no valid _index"
                 context.report("left out", reason, f"{name}, line {number}")
-    numbers = sorted(found)
-    if numbers != list(found):
-        text = "The _index does not always rise: the records are read in its order."
-        context.report("warning", text)
-    last = max([*numbers, catalogs.current_index - 1])
+    last = max([*found, catalogs.current_index - 1])
     if strange := [number for number in catalogs.deleted_indexes if number > last]:
         text = f"{len(strange)} of the deleted indexes belong to no record: {base.few(strange)}."
         context.report("warning", text)
-    for number in numbers:
-        if len(found[number]) > 1:
+    for number, same in found.items():
+        if len(same) > 1:
             context.report("left out", "the _index of several records", f"record {number}")
     return _Tub(
         inputs=inputs,
         types=types,
         rate=dict(metadata).get(_LOOP_HZ),
-        records={number: found[number][0] for number in numbers if len(found[number]) == 1},
+        records={number: same[0] for number, same in sorted(found.items()) if len(same) == 1},
         deleted=catalogs.deleted_indexes,
     )
 
