@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, cast
 
 import msgspec
 import numpy as np
@@ -218,15 +218,18 @@ def own_episodes(
 ) -> list[tuple[EpisodeHeader, str, Iterator[Driver]]]:
     """Return the header, the outcome and the drivers of each episode that Shapechanger exported.
 
-    The section must fit the number of episodes, and the sizes that the rest of the dataset has.
+    The section must fit the number of episodes, and the sizes that the rest of the dataset has;
+    datasets of others have None.
     """
+    if section is None:
+        return []
     own: _Own = converted(section, _Own, where)
     episodes: list[tuple[EpisodeHeader, str, Iterator[Driver]]] = []
     for fields in own.episodes:
         with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
             header = EpisodeHeader.from_json(fields)
         runs: _Runs = converted(fields.get("drivers", []), _Runs, where)
-        drivers = chain.from_iterable(repeat(*run) for run in runs)
+        drivers = cast("Iterator[Driver]", chain.from_iterable(repeat(*run) for run in runs))
         episodes.append((header, str(fields.get("outcome", "")), drivers))
     kinds = {(h.action_layout.size, h.state_layout.size, h.image_size) for h, *_ in episodes}
     kinds |= (

@@ -145,8 +145,8 @@ class _Dataset:
     def read(self) -> Iterator[base.ExchangeEpisode]:
         """Yield the episodes; one whose keys disagree is refused when its records are read."""
         path, header = self._folder / OURS, self._header
-        count, is_ours = max(self._entries) + 1, path.is_file()
-        own = files.own_episodes(files.read_json(path), path, count, header) if is_ours else []
+        section = files.read_json(path) if path.is_file() else None
+        own = files.own_episodes(section, path, max(self._entries) + 1, header)
         for number, entry in self._entries.items():
             head, outcome, drivers = own[number] if own else (header, "", iter(()))
             task = {"task": ", ".join(entry.tasks)} if entry.tasks else {}

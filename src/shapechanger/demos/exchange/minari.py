@@ -172,24 +172,21 @@ class _Dataset:
         self._values = self._main.stat().st_size  # That the file can still hold.
         if self._count > self._values:
             raise DemosError(f"{path} claims {self._count} episodes, but {_MAIN} is smaller.")
+        texts = {_OBSERVATIONS: about.observation_space, _ACTION: about.action_space}
         observed, acted = (
             dict(files.parse_json(text, f"A space in {path}", _Space).leaves(column))
-            for text, column in (
-                (about.observation_space, _OBSERVATIONS),
-                (about.action_space, _ACTION),
-            )
+            for column, text in texts.items()
         )
         self._images = {at: space for at, space in observed.items() if space.image_size()}
         if len(self._images) > 1:
             names = ", ".join(self._images)
             raise DemosError(f"{path} has {len(self._images)} images ({names}): keep one.")
         sensed = {at: space for at, space in observed.items() if at not in self._images}
-        wrong = f"A space in {path} is damaged"
-        with translate_errors(
-            TypeError, ValueError, to=lambda error: DemosError(f"{wrong}: {error}.")
-        ):
-            states, actions = self._features(sensed), self._features(acted)
-        if len(actions) < len(acted):
+        try:
+            self._state, self._action = self._features(sensed), self._features(acted)
+        except (TypeError, ValueError) as error:
+            raise DemosError(f"A space in {path} is damaged: {error}.") from error
+        if len(self._action) < len(acted):
             names = "Box, Discrete, MultiDiscrete or MultiBinary"
             raise DemosError(f"{path}: the action_space must consist of {names} of few values.")
         hz = about.control_hz or context.hz
@@ -197,24 +194,15 @@ class _Dataset:
             context.report("note", base.UNKNOWN_RATE)
             hz = None
         self._header = EpisodeHeader(
-            action_layout=Layout(tuple(chain(*actions.values()))),
-            state_layout=Layout(tuple(chain(*states.values()))),
+            action_layout=Layout(tuple(chain(*self._action.values()))),
+            state_layout=Layout(tuple(chain(*self._state.values()))),
             image_size=next((space.image_size() for space in self._images.values()), None),
             control_hz=hz or base.DEFAULT_HZ,
             clock="none",
             source="minari",
             notes={"dataset": about.dataset_id, "rate_is_known": hz is not None},
         )
-        self._own = (
-            files.own_episodes(about.ours, path, self._count, self._header)
-            if about.ours is not None
-            else []
-        )
-        # The number of values of each column.
-        self._action, self._state = (
-            {at: sum(one.size for one in part) for at, part in features.items()}
-            for features in (actions, states)
-        )
+        self._own = files.own_episodes(about.ours, path, self._count, self._header)
 
     def _features(self, leaves: Mapping[str, _Space]) -> dict[str, list[Feature]]:
         """Return the features of each numeric leaf, keyed by column; other leaves are reported."""
@@ -245,7 +233,9 @@ class _Dataset:
     def _columns(self, file: Any, where: str) -> dict[str, Any]:
         """Return the columns of an episode; refuse columns that do not fit together."""
         arrays = _arrays(file, where)
-        sizes = {_TERMINATED: 1, _TRUNCATED: 1, _REWARD: 1, **self._action, **self._state}
+        sizes = {_TERMINATED: 1, _TRUNCATED: 1, _REWARD: 1}
+        for column, features in (self._action | self._state).items():
+            sizes[column] = sum(feature.size for feature in features)
         infos = [_STEP, *([_FRAME] if self._images else [])] if self._own else []
         names = [*sizes, *infos, *self._images]
         if missing := [name for name in names if name not in arrays]:
