@@ -63,6 +63,7 @@ COMMANDS: Final = {
 
 _OTHER_SIZE: Final = "an image of {} x {} pixels, and not {} x {}"
 _MAX_FEATURES: Final = 512  # That values become one by one; more become one array feature.
+_Size = tuple[int, int] | None
 _NS_PER_S: Final = 1e9
 _PAUSE_PERIODS: Final = 30.0
 _NEAR: Final = (0.5, 1.5)  # Of the median period; one missing record is 2.
@@ -251,20 +252,17 @@ def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[
         yield record
 
 
-def _loaded(
-    record: ExchangeRecord, size: tuple[int, int] | None = None
-) -> tuple[bytes | None, tuple[int, int] | None]:
+def _loaded(record: ExchangeRecord, size: _Size = None) -> tuple[bytes | None, _Size]:
     """Return the image of a record as JPEG, and its size; without a whole one it gets a fault."""
-    if record.fault or record.image is None:
-        return None, None
-    try:
-        jpeg, found = load_jpeg(record.image)
-    except DemosError as error:
-        record.fault = str(error)
-        return None, None
-    if size is not None and found != size:
-        record.fault = _OTHER_SIZE.format(*found, *size)
-    return jpeg, found
+    if not record.fault and record.image is not None:
+        try:
+            jpeg, found = load_jpeg(record.image)
+            if size is not None and found != size:
+                record.fault = _OTHER_SIZE.format(*found, *size)
+            return jpeg, found
+        except DemosError as error:
+            record.fault = str(error)
+    return None, None
 
 
 def decoded_images(
@@ -305,18 +303,16 @@ def drives(
         context: Collects the findings.
         stated_hz: Steps per second according to the source, if it does state them.
     """
-    sizes = [[_loaded(record)[1] for record in session] for session in sessions]
-    ((common, _),) = Counter(filter(None, chain(*sizes))).most_common(1) or [(None, 0)]
+    sizes = [_loaded(record)[1] for record in chain(*sessions)]
+    ((common, _),) = Counter(filter(None, sizes)).most_common(1) or [(None, 0)]
+    for record, size in zip(chain(*sessions), sizes, strict=True):
+        if size and common and size != common:
+            record.fault = _OTHER_SIZE.format(*size, *common)
+        if record.fault:
+            context.report("left out", record.fault, record.name)
     parts: list[list[ExchangeRecord]] = []
-    for session, found in zip(sessions, sizes, strict=True):
-        part: list[ExchangeRecord] = []
-        for record, size in zip(session, found, strict=True):
-            if size and common and size != common:
-                record.fault = _OTHER_SIZE.format(*size, *common)
-            if record.fault:
-                context.report("left out", record.fault, record.name)
-            else:
-                part.append(record)
+    for session in sessions:
+        part = [record for record in session if not record.fault]
         missing = sum(record.step.captured_ns is None for record in part)
         if 0 < missing < len(part):
             text = "some records lack a time: the times of its session are left out"
@@ -325,12 +321,11 @@ def drives(
         parts += [part] if part else []
     for part, hz in zip(parts, _rates(parts, context, stated_hz), strict=True):
         timed, starts = part[0].step.captured_ns is not None, [0]
-        for number, period_ns in enumerate(_periods_ns(part), 1):
-            if period_ns < 0:
-                text = "time runs backwards: an episode begins"
-                context.report("warning", text, part[number].name)
-            elif period_ns > longest_period_s(hz) * _NS_PER_S:
-                context.report("note", "an episode begins after a pause", part[number].name)
+        for number, (now, later) in enumerate(pairwise(part), 1):
+            if (passed_ns := _passed_ns(now, later)) < 0:
+                context.report("warning", "time runs backwards: an episode begins", later.name)
+            elif passed_ns > longest_period_s(hz) * _NS_PER_S:
+                context.report("note", "an episode begins after a pause", later.name)
             else:
                 continue
             starts.append(number)
@@ -340,9 +335,8 @@ def drives(
             yield part[one:two], head
 
 
-def _periods_ns(part: Sequence[ExchangeRecord]) -> list[int]:
-    """Return the times between records; 0 for records without a time."""
-    return [(b.step.captured_ns or 0) - (a.step.captured_ns or 0) for a, b in pairwise(part)]
+def _passed_ns(one: ExchangeRecord, two: ExchangeRecord) -> int:
+    return (two.step.captured_ns or 0) - (one.step.captured_ns or 0)
 
 
 def _leave_out_times(part: Iterable[ExchangeRecord]) -> None:
@@ -355,11 +349,8 @@ def _rates(
 ) -> list[float]:
     """Return the rate of each session; times that contradict the stated one are left out."""
     periods_ns = [
-        [
-            ns / max(1, b.number - a.number)
-            for ns, (a, b) in zip(_periods_ns(p), pairwise(p), strict=True)
-        ]
-        for p in parts
+        [_passed_ns(a, b) / max(1, b.number - a.number) for a, b in pairwise(part)]
+        for part in parts
     ]
     measured = measured_hz([*chain.from_iterable(periods_ns)])
     about = f"{1e3 / (measured or inf):.4g} ms apart, {measured or 0.0:.4g} a second"

@@ -138,13 +138,10 @@ def _others(
         raise DemosError(f"{path} has two columns of one name: rename one of them.")
     if others := known.keys() - set(chain.from_iterable(columns.values())):
         context.report("note", f"Columns that are not imported: {', '.join(sorted(others))}.")
-    values = {
-        field: [name.removeprefix(_NAMES[field]) for name in columns[field]]
-        for field in ("action", "state")
-    }
+    keys = [[n.removeprefix(_NAMES[key]) for n in columns[key]] for key in ("action", "state")]
     actions, states = (
         Layout(tuple(base.COMMANDS.get(name) or base.features_of(name, 1)[0] for name in names))
-        for names in values.values()
+        for names in keys
     )
     header = EpisodeHeader(action_layout=actions, state_layout=states, source="csv")
     records = _records(place, place.name, list(known), lines, columns, known)

@@ -231,10 +231,8 @@ def own_episodes(
         runs: _Runs = converted(fields.get("drivers", []), _Runs, where)
         drivers = cast("Iterator[Driver]", chain.from_iterable(repeat(*run) for run in runs))
         episodes.append((header, str(fields.get("outcome", "")), drivers))
-    kinds = {(h.action_layout.size, h.state_layout.size, h.image_size) for h, *_ in episodes}
-    kinds |= (
-        {(found.action_layout.size, found.state_layout.size, found.image_size)} if found else set()
-    )
+    heads = [head for head, *_ in episodes] + ([found] if found else [])
+    kinds = {(head.action_layout.size, head.state_layout.size, head.image_size) for head in heads}
     if len(episodes) != count or (found and len(kinds) > 1):
         raise DemosError(f"{where} is of another dataset: remove it if the dataset was edited.")
     return episodes

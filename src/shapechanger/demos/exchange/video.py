@@ -10,10 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,8 +65,7 @@ class VideoWriter:
             raise OutputError(f"Cannot write {self._path}: it has {written} images.")
 
 
-@dataclass(frozen=True, slots=True)
-class VideoTimes:
+class VideoTimes(NamedTuple):
     """When the images of a video are shown, in ticks of its clock.
 
     Attributes:
@@ -115,13 +113,12 @@ def _require_whole(path: Path) -> None:
         return sum(int.from_bytes(tables[end : end + 4], "big") for end in ends)
 
     samples = claimed(b"stsz|stz2", 8) + claimed(b"trun", 4)
-    in_chunks = 0
     for match in re.finditer(b"stsc", tables):
         runs = 12 * int.from_bytes(tables[match.end() + 4 :][:4], "big")
         table = tables[match.end() + 8 :][:runs]
         each = np.frombuffer(table[: len(table) // 12 * 12], ">u4")[1::3]
-        in_chunks += int(each.max(initial=0)) // 1024 * claimed(b"stco|co64", 4)
-    if (samples + in_chunks) * (1 + claimed(b"elst", 4)) > _MAX_SAMPLES or b"cmov" in tables:
+        samples += int(each.max(initial=0)) // 1024 * claimed(b"stco|co64", 4)
+    if samples * (1 + claimed(b"elst", 4)) > _MAX_SAMPLES or b"cmov" in tables:
         raise DemosError(f"{path} claims to have more than {_MAX_SAMPLES} images.")
 
 
