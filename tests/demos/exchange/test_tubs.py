@@ -184,7 +184,8 @@ def test_catalogs_in_another_order(tmp_path: Path) -> None:
     in_manifest('"deleted_indexes": []', '"deleted_indexes": [2, 8, 9]')(folder)
     episodes, done = imported(folder)
     assert episodes == [[0, 1, 3, 4, 5]]
-    assert findings_of(done).splitlines()[:1] == [
+    assert findings_of(done).splitlines()[:2] == [
+        "note: 3 of the records 0 to 8 are in no catalog.",
         "warning: 1 of the deleted indexes belong to no record: 9.",
     ]
 
@@ -343,6 +344,8 @@ def test_depth_and_lists_are_named(tmp_path: Path) -> None:
     made = [r | extra for r in records(3)]
     _, done = imported(tub_folder(tmp_path / "tub", made, inputs=inputs))
     assert "not imported: cam/depth_array, lidar, gear." in findings_of(done)
+    _, done = imported(tub_folder(tmp_path / "deep", [r | NO_IMAGE for r in made], inputs=inputs))
+    assert "warning: The steps have no images, because images of 16 bits" in findings_of(done)
 
 
 def test_unknown_times_and_starts(tmp_path: Path) -> None:

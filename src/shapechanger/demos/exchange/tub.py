@@ -49,6 +49,7 @@ _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
 _NUMBERS: Final = ("float", "int", "boolean")
 _PICTURES: Final = ("image_array", "image")
+_DEPTH: Final = "gray16_array"
 
 Fields = dict[str, Any]
 Axis = Annotated[float, Meta(ge=-1.0, le=1.0)] | None
@@ -134,13 +135,14 @@ def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
             try:
                 if line.strip():
                     fields: Fields = files.parse_json(line, name, Fields)
-                    found.setdefault(files.converted(fields.get("_index"), int, name), []).append(
-                        fields
-                    )
+                    index: int = files.converted(fields.get("_index"), int, name)
+                    found.setdefault(index, []).append(fields)
             except DemosError:
                 reason = "damaged JSON, or no valid _index"
                 context.report("left out", reason, f"{name}, line {number}")
     last = max([*found, catalogs.current_index - 1])
+    if (missing := last + 1 - len(found)) > 0:
+        context.report("note", f"{missing} of the records 0 to {last} are in no catalog.")
     if strange := [number for number in catalogs.deleted_indexes if number > last]:
         text = f"{len(strange)} of the deleted indexes belong to no record: {base.few(strange)}."
         context.report("warning", text)
@@ -162,14 +164,17 @@ def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEp
     tub = (_read_v2 if is_v2 else _read_v1)(folder, context)
     if len(tub.inputs) != len(tub.types):
         raise DemosError(f"{folder} has {len(tub.inputs)} inputs, but {len(tub.types)} types.")
-    types = dict(zip(tub.inputs, tub.types, strict=True))
-    kept = {n: fields for n, fields in tub.records.items() if n not in {*tub.deleted}}
+    types, deleted = dict(zip(tub.inputs, tub.types, strict=True)), {*tub.deleted}
+    kept = {n: fields for n, fields in tub.records.items() if n not in deleted}
     if gone := len(tub.records) - len(kept):
         context.report("note", f"Records that are deleted in the tub are not imported: {gone}.")
     there = list(dict.fromkeys(name for fields in kept.values() for name in fields))
     cameras = [name for name in there if types.get(name) in _PICTURES or name == _IMAGE]
     camera = _IMAGE if _IMAGE in cameras and not context.camera else ""
     camera = camera or base.choose_camera(folder, cameras, context)
+    if not camera and _DEPTH in map(types.get, there):
+        text = "The steps have no images, because images of 16 bits are not imported."
+        context.report("warning", text)
     numeric = [name for name, kind in types.items() if name and kind in _NUMBERS]
     sensed = [name for name in numeric if not name.startswith(("user/", "pilot/", "_"))]
     taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
