@@ -307,7 +307,7 @@ def test_a_partial_import_has_an_exit_code_of_its_own(
     output = capsys.readouterr()
     assert "1 episode, 26 steps, 26 images" in output.out
     assert "note: Columns that are not imported: lap.\n" in output.out
-    assert "which is taken to be 20 Hz; --hz states it.\n" in output.out
+    assert "so 20 Hz are assumed; --hz sets the rate.\n" in output.out
     assert output.err == "left out: record 3, record 5, record 8, ... (4 in all): an empty image\n"
     with pytest.raises(SystemExit) as ended:
         main(["demos", "import", str(tub), "--out", str(tmp_path / "b"), "--hz", "10"])

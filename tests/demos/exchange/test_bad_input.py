@@ -104,7 +104,7 @@ FALSE = b"false,false"
         (
             True,
             _edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)),
-            "8 x 8 pixels, and not 40",
+            "8 x 8 pixels instead of 40",
         ),
     ],
 )
@@ -278,7 +278,7 @@ def test_episodes_of_two_kinds(tmp_path: Path, changes: dict[str, object], expec
     ("jpeg", "expected"),
     [
         (huge(), "claims 60000 x 60000"),
-        (picture(1, 48, 32), "48 x 32 pixels, and not 40 x 32"),
+        (picture(1, 48, 32), "48 x 32 pixels instead of 40 x 32"),
         (picture(1, grey=True), "grey or coloured images, and not both of step 1"),
     ],
 )

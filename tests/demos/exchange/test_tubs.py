@@ -139,7 +139,7 @@ def in_manifest(old: str, new: str) -> Callable[[Path], object]:
         ),
         (
             lambda f: (f / "images/0_cam_image_array_.jpg").write_bytes(picture(0, 80, 32)),
-            "record 0: an image of 80 x 32 pixels, and not 40 x 32",
+            "record 0: an image of 80 x 32 pixels instead of 40 x 32",
             {0},
         ),
         (lines(lambda ls: [*ls, bytes(512)]), "line 7: damaged JSON", set()),
@@ -239,7 +239,7 @@ def test_a_damaged_manifest(tmp_path: Path, lines: int) -> None:
         (52.0, 20, None, 20.0, ""),
         (52.0, "soon", None, 19.23, ""),
         (52.0, "50", None, 50.0, "19.23 a second, not at 50 Hz: their times are left out"),
-        (3.0, None, None, 333.0, "unlike those of robots: --hz states the rate"),
+        (3.0, None, None, 333.0, "unlike those of robots: --hz sets the rate"),
         (3.0, None, 20.0, 20.0, "3 ms apart"),
     ],
 )
@@ -358,6 +358,6 @@ def test_unknown_times_and_starts(tmp_path: Path) -> None:
         del record["_timestamp_ms"]
     folder = tub_folder(tmp_path / "none", made)
     _, done = imported(folder)
-    assert findings_of(done).startswith("note: The rate is unknown and taken to be 20 Hz;")
+    assert findings_of(done).startswith("note: The rate is unknown: 20 Hz are assumed;")
     (episode,) = all_of(next(p for p in tmp_path.iterdir() if p.name.startswith("none-data")))
     assert episode.header.created == ""

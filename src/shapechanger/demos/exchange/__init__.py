@@ -1,9 +1,9 @@
 """Import and export of recordings in other formats.
 
-A format is one file: it reads folders into `ExchangeEpisode`s, writes these, and declares a
-`Format` (`base`). `base.COLUMNS` names each column of a step. `files` and `video` load and check
-what strangers made. What is not whole is left out here, with its name and the reason. Sources are
-never changed, and targets appear atomically.
+The module of a format reads folders into `ExchangeEpisode`s, writes such episodes to folders, and
+declares a `Format`. `base.COLUMNS` maps the fields of a step to the columns of each format. `files`
+and `video` load and check untrusted files. Damaged parts are left out and reported with the reason.
+Sources are never changed, and targets appear atomically.
 """
 
 from __future__ import annotations
@@ -67,10 +67,10 @@ _OWN: Final = (tub.FORMAT, minari.FORMAT, lerobot.FORMAT, csv_files.FORMAT, mcap
 
 @cache
 def formats() -> Mapping[str, Format]:
-    """Return all formats by name: our own, and those that entry points of other packages name.
+    """Return all formats, keyed by name: our own, and formats of other packages' entry points.
 
     Raises:
-        DemosError: If an entry point does not name a format, or one with a name that is taken.
+        DemosError: If an entry point does not name a `Format`, or two formats have the same name.
     """
     found = {form.name: form for form in _OWN}
     for point in entry_points(group=_GROUP):
@@ -91,7 +91,7 @@ class Converted:
         episodes: Number of episodes written.
         steps: Number of steps written.
         pictures: Number of images of an import.
-        findings: What is left out, contradictions in the source, and what an export changes.
+        findings: Parts left out, contradictions in the source, and changes by an export.
     """
 
     format: str
@@ -116,7 +116,7 @@ def export_recording(
         data: A recording, or one episode; it is not changed.
         out: The folder to create, atomically.
         format: Name of one of the `formats`.
-        dropped: Whether to export excluded steps too, marked as such; minari, csv and mcap only.
+        dropped: Whether to export excluded steps, too, marked as excluded; minari, csv, mcap only.
         task: What the robot does, in words, for policies that follow language; lerobot only.
         images: Whether to store images as they were recorded, instead of video; lerobot only.
 
@@ -160,7 +160,7 @@ def _require_options(form: Format, **given: object) -> None:
 
 
 def _exchanged(episode: Episode, steps: Sequence[Step], outcome: str) -> ExchangeEpisode:
-    """Return an episode, or a part of it, which begins at its first step."""
+    """Return the given steps of an episode, with the time of the first step as start time."""
     header = episode.header
     if steps and (since_s := _passed_s(episode.steps[0], steps[0])):
         with suppress(ValueError, OverflowError):
@@ -181,11 +181,11 @@ def _exchanged(episode: Episode, steps: Sequence[Step], outcome: str) -> Exchang
     return ExchangeEpisode(header=header, records=records(), name=name, outcome=outcome)
 
 
-_Part = tuple[Episode, Sequence[Step], str]  # Of an episode, with its outcome.
+_Part = tuple[Episode, Sequence[Step], str]  # An episode, some of its steps, and the outcome.
 
 
 def _consecutive(chosen: Sequence[_Part], form: Format, notes: list[str]) -> list[_Part]:
-    """Split episodes where steps are excluded or missing, and at pauses; add notes on it."""
+    """Split episodes at excluded or missing steps and at pauses, and add notes about it."""
     parts: list[_Part] = []
     off_s = 0.0
     chosen = [part for part in chosen if part[1]]
@@ -206,14 +206,13 @@ def _consecutive(chosen: Sequence[_Part], form: Format, notes: list[str]) -> lis
             off_s = max(off_s, *(abs(at_s - n / hz) for n, at_s in enumerate(times_s)))
     if len(parts) > len(chosen):
         notes.append(
-            f"{form.title} takes each step for the successor of the one before, so episodes are "
-            f"split at pauses and where steps are excluded or missing: {len(chosen)} became "
-            f"{len(parts)}."
+            f"In {form.title}, each step directly follows the step before, so episodes are split "
+            f"at pauses and where steps are excluded or missing: {len(chosen)} became {len(parts)}."
         )
     if off_s > 0.5 / first.header.control_hz and not form.timed:
         notes.append(
-            f"{form.title} takes the time of a step to be its number divided by the rate, which is "
-            f"off by up to {off_s:.4g} s."
+            f"{form.title} computes the time of a step from its number and the rate; these times "
+            f"are wrong by up to {off_s:.4g} s."
         )
     return parts
 
@@ -231,14 +230,14 @@ def import_episodes(path: Path, context: ImportContext | None = None) -> Iterato
 
     Args:
         path: A folder in one of the `formats`.
-        context: Options; it collects the findings. None to refuse a source that is incomplete or
-            contradicts itself.
+        context: Options of the import, to which findings are added. None to refuse a source that
+            is incomplete or contradicts itself.
 
     Yields:
         The episodes; their steps are read when they are iterated.
 
     Raises:
-        DemosError: If something is damaged or missing, possibly not before it is read.
+        DemosError: If something is damaged or missing, possibly while an episode is iterated.
         MissingExtra: If a package that the format needs is not installed.
     """
     yield from _read(path, "auto", context or ImportContext(strict=True))[1]
@@ -259,13 +258,13 @@ def import_recording(
         path: A folder in one of the `formats`; it is not changed.
         out: The recording to create, atomically.
         format: Name of one of the formats, or "auto" to detect it.
-        camera: Which camera to take, such as "front"; "" for the only one. LeRobot and tubs only.
-        hz: Steps per second; None to read or measure them. Only for formats that do not state it.
+        camera: Camera to import, such as "front"; "" for the only one. LeRobot and tubs only.
+        hz: Steps per second; None to read or measure the rate. Only for formats without a rate.
         strict: Whether to refuse a source that is incomplete or contradicts itself.
 
     Raises:
-        DemosError: If nothing in `path` is whole, or with `strict` not all of it, or `out` exists
-            or lies in it.
+        DemosError: If `path` has no intact episode, or `strict` is set and a part is damaged, or
+            `out` exists or lies in `path`.
         UnknownName: If there is no such format.
         OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
@@ -276,7 +275,7 @@ def import_recording(
     now = datetime.now(UTC)
     with new_folder(out, path) as folder:
         for episode in read:
-            if not counts:  # One time begins the names of all folders, so that order is kept.
+            if not counts:  # Folder names begin with this time, so that episodes keep their order.
                 with suppress(ValueError):
                     now = datetime.fromisoformat(episode.header.created).astimezone(UTC)
             counts += _write(episode, folder, now, context)
@@ -288,7 +287,7 @@ def import_recording(
 
 
 def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterator[ExchangeEpisode]]:
-    """Return the format of a folder, and an iterator over its episodes of whole records."""
+    """Return the format of a folder, and an iterator over its episodes with intact records."""
     names = ["auto", *(name for name, form in formats().items() if form.read)]
     if format not in names:
         raise UnknownName("format", format, names)
@@ -307,8 +306,8 @@ def find_format(path: Path) -> str:
     """Detect the format of a folder.
 
     Raises:
-        DemosError: If there is no such folder, or it has none or several of the formats; the error
-            names what was found.
+        DemosError: If the folder does not exist, or has no known format, or several; the error
+            lists the formats.
     """
     found = _formats_of(path)
     if len(found) == 1:
@@ -331,7 +330,7 @@ def _formats_of(path: Path) -> list[str]:
 def _write(
     episode: ExchangeEpisode, folder: Path, now: datetime, context: ImportContext
 ) -> list[tuple[int, int]]:
-    """Write one episode of a recording; return its numbers of steps and images, [] without any."""
+    """Write an episode; return its numbers of steps and images in a list, empty without steps."""
     excluded: dict[int, str] = {}
     pictures, shown, writer = 0, None, None
     try:
@@ -348,7 +347,7 @@ def _write(
                 if writer.is_full:
                     raise DemosError("longer than an episode may be, about an hour at 100 Hz.")
             writer.close(episode.outcome)
-        # Consecutive steps that were dropped for one reason become one line.
+        # Consecutive steps that are excluded for the same reason become one `Drop`.
         runs = groupby(enumerate(excluded.items()), key=lambda it: (it[1][1], it[1][0] - it[0]))
         for (why, _), run in runs:
             indexes = [index for _, (index, _) in run]

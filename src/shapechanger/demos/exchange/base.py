@@ -1,8 +1,8 @@
-"""Formats of datasets: their declaration, the names of their columns, and records on their way.
+"""Declaration of formats, names of their columns, and the records that readers and writers share.
 
-A reader yields `ExchangeEpisode`s of `ExchangeRecord`s; `whole_records` leaves out the damaged
-ones. If the rate is not stated, `drives` measures it: the mean over the periods near the median,
-because a median of times in whole milliseconds is off by up to 2 % at 20 Hz.
+A reader yields `ExchangeEpisode`s of `ExchangeRecord`s, of which `whole_records` leaves out the
+damaged ones. If a source does not state its rate, `drives` measures it from the mean of the periods
+near the median. The median itself is wrong by up to 2 % at 20 Hz if times are whole milliseconds.
 """
 
 from __future__ import annotations
@@ -59,40 +59,42 @@ COMMANDS: Final = {
     "throttle": Feature("throttle", "1", -1.0, 1.0),
     **{key: Feature(key, "1", 0.0, 1.0) for key in ("forward", "backward", "right", "left")},
 }
-"""Values of an action by their names in tables of other programs; a key that is held is 1."""
+"""Features of actions, keyed by column of other programs' tables; a pressed key is 1."""
 
-_OTHER_SIZE: Final = "an image of {} x {} pixels, and not {} x {}"
-_MAX_FEATURES: Final = 512  # That values become one by one; more become one array feature.
+_OTHER_SIZE: Final = "an image of {} x {} pixels instead of {} x {}"
+_MAX_FEATURES: Final = 512  # Columns with more values become one array feature.
 _Size = tuple[int, int] | None
 _NS_PER_S: Final = 1e9
 _PAUSE_PERIODS: Final = 30.0
-_NEAR: Final = (0.5, 1.5)  # Of the median period; one missing record is 2.
-_MIN_PERIODS: Final = 10  # A shorter drive is not evidence of its rate.
-_RATE_RATIO: Final = 1.3  # Rates of two settings differ by at least a third.
-_SLOWEST_HZ, _FASTEST_HZ = 1.0, 100.0  # As `control_hz` of a profile.
-# A loop that sleeps for the rest of each period, as Donkeycar's, is up to 2 % slow.
+_NEAR: Final = (0.5, 1.5)  # Times the median period; a missing record doubles a period.
+_MIN_PERIODS: Final = 10  # Drives with fewer periods get the rate of all drives.
+_RATE_RATIO: Final = 1.3  # Rates above this ratio have two settings, which differ by a third.
+_SLOWEST_HZ, _FASTEST_HZ = 1.0, 100.0  # Range of `control_hz` in a profile.
+# Nominal rates are multiples of these steps (Hz), within these relative tolerances: a loop that
+# sleeps for the rest of each period, such as Donkeycar's, is up to 2 % slow.
 _WHOLE: Final = ((1.0, 0.005), (5.0, 0.025))
 
 DEFAULT_HZ: Final = 20.0
 """Steps per second of an episode without any information on its rate, Hz."""
 
-UNKNOWN_RATE: Final = f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it."
+UNKNOWN_RATE: Final = f"The rate is unknown: {DEFAULT_HZ:g} Hz are assumed; --hz sets it."
 
 
 @dataclass(slots=True, kw_only=True)
 class ExchangeRecord:
-    """A step between two formats.
+    """A step that is imported or exported.
 
     Attributes:
         step: The step; its index and the name of its frame are ignored.
-        jpeg: Its image; the same object if it is the image of the record before. An import sets it.
-        marks: Texts of its marks.
-        dropped: Why the step is excluded; None if it is not.
-        name: Its name in reports.
-        number: Its number in the source; gaps are missing records.
-        image: Its image in the source: a file, a JPEG, PNG or BMP, or pixels; None without one.
+        jpeg: JPEG of the step's image; the same object in successive records that share an image.
+            Readers leave it None, and `whole_records` sets it from `image`.
+        marks: Texts of the step's marks.
+        dropped: Why the step is excluded; None if it is not excluded.
+        name: Name of the record in findings.
+        number: Number of the record in the source; gaps are missing records.
+        image: Image in the source: a file, the bytes of a JPEG, PNG or BMP, or pixels; or None.
         frame: Equal for successive records that share an image; None to compare `image`.
-        fault: Why it cannot be imported; "" if it can.
+        fault: Why the record cannot be imported; "" if it can be.
     """
 
     step: Step
@@ -108,14 +110,14 @@ class ExchangeRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExchangeEpisode:
-    """One episode between two formats.
+    """An episode that is imported or exported.
 
     Attributes:
-        header: Its metadata.
-        records: Its steps in order; they can be iterated once, at any time. A DemosError meanwhile
-            leaves the episode out.
-        name: How to name the episode in errors.
-        outcome: How it ended; "" if unspecified.
+        header: Metadata of the episode.
+        records: Steps in order, which can be iterated once. If the iterator raises `DemosError`, an
+            import leaves the episode out.
+        name: Name of the episode in errors.
+        outcome: How the episode ended; "" if unspecified.
     """
 
     header: EpisodeHeader
@@ -140,8 +142,8 @@ class ImportContext:
     """Options of an import, and its findings so far.
 
     Attributes:
-        camera: Name of the camera to take, if there are several; "" for the only one.
-        hz: Steps per second, as stated by the user; None to read or measure them.
+        camera: Name of the camera to import, if there are several; "" for the only one.
+        hz: Steps per second, as stated by the user; None to read or measure the rate.
         strict: Whether to refuse a source that is incomplete or contradicts itself.
     """
 
@@ -153,15 +155,15 @@ class ImportContext:
     )
 
     def report(self, kind: Kind, text: str, name: str = "") -> None:
-        """Add a finding; parts of one finding are listed together.
+        """Add a finding; parts with the same kind and text are listed together.
 
         Args:
-            kind: Its kind.
-            text: A sentence, or the reason if parts are named.
-            name: The part that it is about.
+            kind: Kind of the finding.
+            text: A sentence; or with `name`, the reason for that part.
+            name: The part of the source, such as a record; "" if the finding is about all of it.
 
         Raises:
-            DemosError: If `strict`, unless it is a note.
+            DemosError: If `strict` is set and the kind is not "note".
         """
         names = self._found.setdefault((kind, text), [])
         names += [name] if name else []
@@ -184,7 +186,7 @@ class ExportContext:
     """Options of an export.
 
     Attributes:
-        out: The folder that the user asked for; a writer gets another one, which is moved there.
+        out: The folder that the user asked for; the writer's folder is renamed to it at the end.
         task: What the robot does, in words; "" if not given.
         images: Whether to store images as they were recorded, instead of video.
         rewarded: Whether all steps have a reward.
@@ -198,21 +200,21 @@ class ExportContext:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """Declaration of a format, which a module binds to a name and an entry point names.
+    """Declaration of a format, which an entry point of another package can name.
 
     Attributes:
-        name: Its name on the command line.
-        title: Its name in sentences.
-        sign: Files by which a folder of the format is known, such as "steps.csv".
+        name: Name on the command line.
+        title: Name in sentences.
+        sign: Files that identify a folder of the format, such as "steps.csv".
         detect: Returns whether a folder has the format; None if it cannot be imported.
         read: Yields the episodes of a folder, and reports findings to the context.
         write: Writes episodes into an existing folder and returns the number of steps; None if the
             format cannot be exported.
-        options: Options that it takes: "camera" and "hz" on import; "task", "images" and "dropped"
-            (excluded steps, marked as such) on export.
-        consecutive: Whether each step follows the one before, so that an export splits episodes,
-            which must have the same layouts, image size and rate.
-        timed: Whether it keeps the times of steps.
+        options: Supported options: "camera" and "hz" on import; "task", "images" and "dropped"
+            (excluded steps are included and marked) on export.
+        consecutive: Whether a step always follows directly on the step before in this format. An
+            export splits episodes at gaps, and requires the same layouts, image size and rate.
+        timed: Whether the format stores the times of steps.
     """
 
     name: str
@@ -233,7 +235,7 @@ def few(names: Sequence[object]) -> str:
 
 
 def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[ExchangeRecord]:
-    """Yield the records of an episode that are whole, with images as JPEG; report the others."""
+    """Yield the intact records of an episode, with images as JPEG; report the other records."""
     size, shown, jpeg = episode.header.image_size, None, None
     sizes = episode.header.action_layout.size, episode.header.state_layout.size
     for record in episode.records:
@@ -253,7 +255,7 @@ def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[
 
 
 def _loaded(record: ExchangeRecord, size: _Size = None) -> tuple[bytes | None, _Size]:
-    """Return the image of a record as JPEG, and its size; without a whole one it gets a fault."""
+    """Return the image of a record as JPEG, and its size; set a fault if the image is damaged."""
     if not record.fault and record.image is not None:
         try:
             jpeg, found = load_jpeg(record.image)
@@ -268,9 +270,9 @@ def _loaded(record: ExchangeRecord, size: _Size = None) -> tuple[bytes | None, _
 def decoded_images(
     episode: ExchangeEpisode, title: str
 ) -> Iterator[tuple[ExchangeRecord, NDArray[np.uint8] | None]]:
-    """Yield the records of an episode with images of one size at all steps or none.
+    """Yield the records of an episode, whose steps must all have images of one size, or none.
 
-    Each comes with the pixels of its image if it is new, shape (height, width, 3).
+    A record with a new image comes with its pixels, shape (height, width, 3); others with None.
     """
     size, shown = episode.header.image_size, None
     for number, record in enumerate(episode.records):
@@ -292,16 +294,17 @@ def drives(
     context: ImportContext,
     stated_hz: float | None = None,
 ) -> Iterator[tuple[list[ExchangeRecord], EpisodeHeader]]:
-    """Yield the drives of a source that does not state its rate or the size of its images.
+    """Yield the drives of a source that may lack its rate and the size of its images.
 
-    Records without a whole image of the most frequent size are left out, so that rates and pauses
-    follow from those that remain. Times that contradict a stated rate are left out, too.
+    Sessions are split at pauses and where time runs backwards. Records with a damaged image, or an
+    image of another size than most, are left out before rates and pauses are measured. If the times
+    contradict a stated rate, they are left out.
 
     Args:
         sessions: Records with their time as `captured_ns`, from one start of the robot to the next.
         header: Metadata of all drives; rate, size of images and clock are filled in.
-        context: Collects the findings.
-        stated_hz: Steps per second according to the source, if it does state them.
+        context: Options of the import, to which findings are added.
+        stated_hz: Steps per second according to the source; None if it does not state a rate.
     """
     sizes = [_loaded(record)[1] for record in chain(*sessions)]
     ((common, _),) = Counter(filter(None, sizes)).most_common(1) or [(None, 0)]
@@ -347,7 +350,7 @@ def _leave_out_times(part: Iterable[ExchangeRecord]) -> None:
 def _rates(
     parts: Sequence[list[ExchangeRecord]], context: ImportContext, stated_hz: float | None
 ) -> list[float]:
-    """Return the rate of each session; times that contradict the stated one are left out."""
+    """Return the rate of each session; leave out times that contradict a stated rate."""
     periods_ns = [
         [_passed_ns(a, b) / max(1, b.number - a.number) for a, b in pairwise(part)]
         for part in parts
@@ -371,31 +374,31 @@ def _rates(
         each = [measured] * len(parts)
     rates = [_nominal_hz(hz) for hz in each]
     if not all(_SLOWEST_HZ <= hz <= _FASTEST_HZ for hz in rates):
-        text = f"The records are {about}, unlike those of robots: --hz states the rate."
+        text = f"The records are {about}, unlike those of robots: --hz sets the rate."
         context.report("warning", text)
     elif abs(each[0] / rates[0] - 1.0) > _WHOLE[0][1]:
-        text = f"The records are {about}, which is taken to be {rates[0]:g} Hz; --hz states it."
+        text = f"The records are {about}, so {rates[0]:g} Hz are assumed; --hz sets the rate."
         context.report("note", text)
     return rates
 
 
 def measured_hz(periods_ns: Sequence[float]) -> float | None:
-    """Return the steps per second by periods in ns, without regard to pauses and outliers."""
+    """Return the steps per second from periods in ns, ignoring pauses and outliers."""
     positive = [period for period in periods_ns if period > 0.0]
     if not positive:
         return None
     typical = statistics.median_low(positive)
     driven = [period for period in positive if period <= _PAUSE_PERIODS * typical]
-    if 2 * len(positive) < len(periods_ns):  # The clock is coarser than a period.
+    if 2 * len(positive) < len(periods_ns):  # Most periods are 0: the clock's ticks are longer.
         return _NS_PER_S * len(periods_ns) / sum(driven)
     low, high = _NEAR
     near = [period for period in driven if low * typical <= period <= high * typical]
-    # If no period prevails, all count.
+    # If fewer than half the periods are near the median, all of them are averaged.
     return _NS_PER_S / statistics.fmean(near if 2 * len(near) > len(driven) else driven)
 
 
 def _nominal_hz(measured: float) -> float:
-    """Return the rate that a loop was set to, from its measured rate: a whole one, if near."""
+    """Return the rate that a loop was set to: a whole number, if the measured rate is near one."""
     for grid, tolerance in _WHOLE:
         nominal = grid * max(1, round(measured / grid))
         if abs(measured / nominal - 1.0) <= tolerance:
@@ -412,7 +415,7 @@ def features_of(
     low: Sequence[float] = (),
     high: Sequence[float] = (),
 ) -> list[Feature]:
-    """Return the features of a column of others: named, numbered, or one array; "?" is no unit."""
+    """Return the features of an imported column: named, numbered, or one array; unit "?"."""
     units = units if len(units) == size and all(units) else ("?",) * size
     lows = low or (-inf,) * size
     highs = high or (inf,) * size
@@ -424,7 +427,7 @@ def features_of(
 
 
 def choose_camera(folder: Path, cameras: Sequence[str], context: ImportContext) -> str:
-    """Return the chosen camera, or the only one; "" without any."""
+    """Return the chosen camera, or the only one; "" if there is no camera."""
     if context.camera:
         if context.camera not in cameras:
             raise UnknownName(f"camera of {folder}", context.camera, cameras)

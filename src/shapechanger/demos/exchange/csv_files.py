@@ -1,11 +1,11 @@
 """CSV: a folder with `header.json`, `steps.csv` and `frames/` for each episode.
 
-Numbers are written so that they are read back exactly; an empty cell is a missing value, `nan` a
-value that nothing measured. Texts are written as JSON with its quotes, so that no spreadsheet takes
-one for a formula, and line ends and other special characters survive.
+Numbers are read back exactly. An empty cell is a missing value, and `nan` is a value that was not
+measured. Texts are JSON with quotes, so that spreadsheets do not evaluate them as formulas, and
+line ends and other special characters are kept.
 
-Without a header, `steps.csv` is a table of others: its columns are known by their names or aliases
-of them, and its images lie in the same folder.
+Without a header, `steps.csv` is a table of another program. Its columns are found by their names or
+aliases, and its images are in the same folder.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ _KNOWN_AS: Final = {
     **dict.fromkeys(("timestamp_ms", "milliseconds"), ("captured_ns", 10**6)),
     "done": ("terminated", 1),
 }
-"""Columns of `steps.csv`, each with its factor to their unit, by names in tables of others."""
+"""Column of `steps.csv` and factor to its unit, keyed by column of other programs' tables."""
 
-_Columns = Mapping[str, Sequence[str]]  # The names of the columns of each field of a step.
+_Columns = Mapping[str, Sequence[str]]  # Names of columns, keyed by field of a step.
 
 
 def _tables_of(folder: Path) -> list[Path]:
@@ -59,7 +59,7 @@ def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
 
 
 def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.ExportContext) -> int:
-    """Write episodes; several episodes get a subfolder each."""
+    """Write one episode to the folder itself, or several to a subfolder each."""
     steps = 0
     for number, episode in enumerate(episodes, 1):
         place = folder if len(episodes) == 1 else folder / f"episode-{number:04d}"
@@ -81,7 +81,7 @@ def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.Expor
 
 
 def _cells(record: base.ExchangeRecord, columns: _Columns) -> Iterator[str]:
-    """Yield the cells of a step after those of its index and image."""
+    """Yield the cells of a step that follow the cells of its index and image."""
     plain = {"terminated": False, "truncated": False} | record.step.to_json()
     plain |= {"marks": record.marks or None, "dropped": record.dropped}
     for field, names in list(columns.items())[2:]:
@@ -158,9 +158,10 @@ def _records(
     columns: _Columns,
     factors: Mapping[str, int],
 ) -> list[base.ExchangeRecord]:
-    """Return the lines of a table with their images, which are in a folder.
+    """Return a record for each line of a table, with its image in `folder`.
 
-    Tables of others have `factors` of their columns, and may lack columns.
+    `factors` maps the columns of another program's table to the factors to our units; it is empty
+    for tables that Shapechanger exported.
     """
     records: list[base.ExchangeRecord] = []
     shown, known, last = "", set[str](), -1
@@ -196,7 +197,7 @@ def _records(
 def _fields(
     cells: Mapping[str, str], columns: _Columns, factors: Mapping[str, int]
 ) -> dict[str, Any]:
-    """Return the fields of a step from the cells of its line; empty ones are left out."""
+    """Return the fields of a step from the cells of its line, without fields of empty cells."""
     fields: dict[str, Any] = {"driver": "person"} if factors else {}
     fields["state"] = [math.nan] * len(columns["state"])
     for field, names in columns.items():

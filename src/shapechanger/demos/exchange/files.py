@@ -1,8 +1,8 @@
-"""Read files and images of datasets, and make new folders, which are complete or absent.
+"""Read files and images of datasets within limits, and create folders atomically.
 
-Reads are limited to `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of an image,
-`MAX_UNPACKED` of compressed data, and regular files inside the folder. All functions raise
-`DemosError` for invalid input, and `MissingExtra` for a package that is not installed.
+A text may have `MAX_TEXT_BYTES`, an image `MAX_PICTURE_BYTES` and `MAX_PIXELS`, and compressed data
+`MAX_UNPACKED` bytes. Only regular files inside the folder are read. All functions raise
+`DemosError` for invalid input, and `MissingExtra` if a package is not installed.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from shapechanger.errors import DemosError, LayoutError, MissingExtra, OutputErr
 from shapechanger.files import read_file, writing
 
 MAX_UNPACKED: Final = 64 << 20
-"""Bytes in memory at once, and allowed for any file. An image of `MAX_PIXELS` has 48 MiB."""
+"""Unpacked bytes that are allowed for any file, and in memory. `MAX_PIXELS` need 48 MiB."""
 
 MAX_VALUES: Final = 1 << 17
 """Largest number of values of a feature."""
 
 _JPEG: Final = b"\xff\xd8"
 _PNG: Final = b"\x89PNG"
-_PNG_DEPTH: Final = slice(24, 25)  # Position of the number of bits of a value.
+_PNG_DEPTH: Final = slice(24, 25)  # Byte of a PNG with the number of bits per value.
 
 
 def library(name: str, extra: str = "data") -> Any:
@@ -55,7 +55,7 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
 
     Args:
         out: The folder to create; it must not exist.
-        source: The folder that is read meanwhile, if any; `out` must not lie in it.
+        source: A folder that `out` must not lie in, because it is read meanwhile; or None.
 
     Yields:
         A hidden folder next to `out` to write to.
@@ -88,7 +88,7 @@ def is_inside(folder: Path, name: str) -> bool:
 
 
 def inside(folder: Path, name: str, named_by: object) -> Path:
-    """Return the path of a regular file inside a folder, which a file of the dataset names."""
+    """Return the path of a file that `named_by` names; refuse all but regular files inside."""
     if not name or not is_inside(folder, name):
         raise DemosError(f"{named_by}: the name {name!r} leaves the folder.")
     if not (folder / name).is_file():
@@ -125,13 +125,14 @@ def read_table(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def load_jpeg(image: Path | bytes | NDArray[np.uint8]) -> tuple[bytes, tuple[int, int]]:
-    """Return an intact image as JPEG, with its width and height; others get quality 100.
+    """Return an image as JPEG, with its width and height; other kinds get JPEG quality 100.
 
     Args:
         image: A file or its content, as JPEG, PNG or BMP; or pixels, shape (height, width, 3).
 
     Raises:
-        DemosError: If it is missing, damaged, of another kind, or too large; a noun with a reason.
+        DemosError: If the image is missing, damaged, of another kind, or too large. The message
+            is a noun phrase, such as "an empty image".
     """
     if isinstance(image, np.ndarray):
         return encode_picture(image), (image.shape[1], image.shape[0])
@@ -160,9 +161,9 @@ def load_jpeg(image: Path | bytes | NDArray[np.uint8]) -> tuple[bytes, tuple[int
 
 
 def image_size(shape: Sequence[int], channels: Sequence[int] = (1, 3)) -> tuple[int, int] | None:
-    """Return the width and height of images by the shape of their pixels, colours first or last.
+    """Return the width and height of images from the shape of their pixels, colours first or last.
 
-    None for a shape of other arrays, or of more than `MAX_PIXELS`.
+    Return None if the shape is not the shape of an image, or has more than `MAX_PIXELS`.
     """
     if len(shape) not in {2, 3}:
         return None
@@ -173,7 +174,7 @@ def image_size(shape: Sequence[int], channels: Sequence[int] = (1, 3)) -> tuple[
 
 
 def _pixels(data: bytes) -> NDArray[np.uint8] | None:
-    """Decode a PNG or BMP of 8 bits, shape (height, width, 3); None if it is refused."""
+    """Decode a PNG or BMP, shape (height, width, 3); None if it is too large or transparent."""
     with library("PIL.Image").open(io.BytesIO(data), formats=["PNG", "BMP"]) as opened:
         if opened.width * opened.height > MAX_PIXELS:
             return None
@@ -182,7 +183,7 @@ def _pixels(data: bytes) -> NDArray[np.uint8] | None:
 
 
 def converted(plain: Any, kind: Any, where: object, *, strict: bool = True) -> Any:
-    """Return what a file holds as a type that msgspec knows."""
+    """Convert a value to a type that msgspec knows; `where` names its source in errors."""
     try:
         return msgspec.convert(plain, kind, strict=strict)
     except msgspec.ValidationError as error:
@@ -190,7 +191,7 @@ def converted(plain: Any, kind: Any, where: object, *, strict: bool = True) -> A
 
 
 def parse_json(text: str | bytes, where: object, kind: Any) -> Any:
-    """Parse JSON of a type that msgspec knows."""
+    """Parse JSON and convert it as `converted` does."""
     try:
         plain = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -199,12 +200,12 @@ def parse_json(text: str | bytes, where: object, kind: Any) -> Any:
 
 
 def read_json(path: Path, kind: Any = dict[str, Any]) -> Any:
-    """Read a file of JSON."""
+    """Read a JSON file and convert its value as `converted` does."""
     return parse_json(read_text(path), path, kind)
 
 
 class _Own(msgspec.Struct):
-    """Our own part of a dataset: the fields of each header, with the outcome and drivers."""
+    """Shapechanger's section of a dataset: fields of each header, with the outcome and drivers."""
 
     format: Literal[1]
     episodes: list[dict[str, Any]]
@@ -218,8 +219,8 @@ def own_episodes(
 ) -> list[tuple[EpisodeHeader, str, Iterator[Driver]]]:
     """Return the header, the outcome and the drivers of each episode that Shapechanger exported.
 
-    The section must fit the number of episodes, and the sizes that the rest of the dataset has;
-    datasets of others have None.
+    The section must have `count` episodes, with the sizes of layouts and images in `found`. A
+    dataset that Shapechanger did not export has the section None; return [].
     """
     if section is None:
         return []
