@@ -23,7 +23,7 @@ CAMERA = "observation.images.front"
 VIDEO = f"videos/{CAMERA}/chunk-000/file-000.mp4"
 DATA = "data/chunk-000/file-000.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
-_LEVELS = 6  # Of brightness between two images.
+_LEVELS = 6  # Difference in brightness between successive images.
 
 Change = Callable[[list[dict[str, Any]]], list[dict[str, Any]] | None]
 
@@ -58,14 +58,14 @@ def write_set(
     info: Mapping[str, Any] | None = None,
     video: bool = True,
 ) -> Path:
-    """Write a dataset whose first action is the number of the step, as is its image.
+    """Write a dataset in which the first action and the image show the number of the step.
 
     Args:
         folder: The folder to create.
         lengths: Steps of each episode.
         fps: Steps per second.
-        video_fps: Images per second, if that is another number.
-        pictures: Numbers of the images; None for one for each step.
+        video_fps: Images per second, if it differs from `fps`.
+        pictures: Numbers of the images; None for an image for each step.
         options: Further options of FFmpeg.
         rows: Changes the rows of the data.
         places: Changes the rows of `meta/episodes`.
@@ -137,9 +137,9 @@ def write_set(
 
 
 def pairs_of(folder: Path, camera: str = "") -> tuple[list[list[tuple[int, int]]], ImportContext]:
-    """Return the number of each step with that of its image, and the findings.
+    """Return pairs of the numbers of step and image for each episode, and the findings.
 
-    One list for each episode; -1 for no image.
+    A step without an image has the image number -1.
     """
     read, context = read_whole(folder, FORMAT, camera)
     shown = {one.jpeg: shown_in(one.jpeg) for part in read for one in part if one.jpeg}

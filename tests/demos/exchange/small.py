@@ -40,7 +40,7 @@ def picture(seed: int, width: int = 40, height: int = 32, *, grey: bool = False)
 
 
 def image_file(pixels: np.ndarray, kind: str = "PNG", mode: str | None = None) -> bytes:
-    """Return an image file of another kind."""
+    """Return an image as a file of the given kind."""
     file = io.BytesIO()
     Image.fromarray(pixels).convert(mode).save(file, kind)
     return file.getvalue()
@@ -95,7 +95,7 @@ def drive(data: Path, count: int = 5, **changes: Any) -> Path:
 
 
 def keys_folder(folder: Path) -> Path:
-    """Create a table of others: the key that was held at each of three images."""
+    """Create a table of another program, with the pressed key for each of three images."""
     folder.mkdir(parents=True)
     held = ["1.0,0.0,0.0,0.0", "0.0,0.0,0.0,1.0", "0.0,0.0,0.0,0.0"]
     lines = ["file,forward,backward,right,left,timestamp"]
@@ -113,7 +113,7 @@ def tub_folder(
     inputs: dict[str, str] | None = None,
     per_catalog: int = 2,
 ) -> Path:
-    """Create a tub of version 2; each record without an image gets one, unless it has None."""
+    """Create a tub of version 2; records without the field of an image get an image."""
     (folder / "images").mkdir(parents=True)
     kinds = {"cam/image_array": "image_array", "user/angle": "float"} | (inputs or {})
     lines: list[dict[str, Any]] = []
@@ -137,7 +137,7 @@ def tub_folder(
 def read_whole(
     folder: Path, form: Format, camera: str = ""
 ) -> tuple[list[list[ExchangeRecord]], ImportContext]:
-    """Read a folder as an import does: the whole records of each episode, and the findings."""
+    """Read a folder like an import; return the intact records of episodes, and the findings."""
     context = ImportContext(camera=camera)
     found: list[list[ExchangeRecord]] = []
     assert form.read is not None
@@ -150,7 +150,7 @@ def read_whole(
 
 
 def findings_of(found: ImportContext | Converted) -> str:
-    """Return all findings as text, a line each."""
+    """Return all findings as text, one per line."""
     return "\n".join(f"{kind}: {text}" for kind, text in found.findings)
 
 
@@ -160,7 +160,7 @@ def all_of(data: Path) -> list[Episode]:
 
 
 def content_of(episode: Episode) -> dict[str, Any]:
-    """Return the content of an episode, except its name and start time, so that NaN equals NaN."""
+    """Return an episode as text without its name and start time, so that NaN equals NaN."""
     head = episode.header.to_json()
     del head["created"]
     kept = {step.index for step in episode.kept}

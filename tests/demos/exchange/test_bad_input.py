@@ -111,7 +111,7 @@ FALSE = b"false,false"
 def test_damaged_lines_of_csv(
     tmp_path: Path, own: bool, spoil: Callable[[Path], object], expected: str
 ) -> None:
-    """Damage by a spreadsheet or an incomplete copy is named, and the other lines imported."""
+    """Lines damaged by a spreadsheet or an incomplete copy are reported, the others imported."""
     folder = _exported(tmp_path, "csv") if own else keys_folder(tmp_path / "keys")
     spoil(folder)
     assert expected in refused(folder, tmp_path / "data", strict=True)
@@ -130,7 +130,7 @@ def test_damaged_lines_of_csv(
     ],
 )
 def test_csv_of_spreadsheets(tmp_path: Path, change: Callable[[bytes], bytes]) -> None:
-    """Semicolons, blank lines and marks of spreadsheets change no number."""
+    """Semicolons, blank lines and byte order marks of spreadsheets do not change numbers."""
     folder = _exported(tmp_path, "csv")
     _edit("steps.csv", change)(folder)
     assert import_recording(folder, tmp_path / "back", strict=True).steps == 5
@@ -165,7 +165,7 @@ def _spoilt(file: h5py.File) -> None:
 
 
 def _with_rest(text: str) -> Callable[[Path], None]:
-    """Return a change of what the first step has without a column."""
+    """Return a change of the fields of the first step that have no column."""
     return _in_file(lambda file: file["episode_0/infos/step"].__setitem__(0, text))
 
 
@@ -279,7 +279,7 @@ def test_episodes_of_two_kinds(tmp_path: Path, changes: dict[str, object], expec
     [
         (huge(), "claims 60000 x 60000"),
         (picture(1, 48, 32), "48 x 32 pixels instead of 40 x 32"),
-        (picture(1, grey=True), "grey or coloured images, and not both of step 1"),
+        (picture(1, grey=True), "cannot mix grey and coloured images: image of step 1"),
     ],
 )
 def test_frames_that_minari_cannot_read(tmp_path: Path, jpeg: bytes, expected: str) -> None:

@@ -1,4 +1,4 @@
-"""LeRobot datasets: what an export keeps, and what an import takes or refuses."""
+"""LeRobot datasets: exports, and imports of exported datasets."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ DATA = "data/chunk-000/file-000.parquet"
 
 
 def smooth(number: int, width: int = 64, height: int = 48) -> bytes:
-    """Return an image that video keeps well: a gradient, brighter with each number."""
+    """Return a gradient, which video keeps well; a higher number is brighter."""
     ramp = np.linspace(0, 60, width)[None, :, None]
     pixels = np.broadcast_to(ramp + 5.0 * number, (height, width, 3))
     return encode_picture(pixels.astype(np.uint8))
 
 
 def smooth_drive(data: Path, count: int = 30, **changes: Any) -> Path:
-    """Record an episode with such images, two drivers, rewards and an end."""
+    """Record an episode with gradients as images, two drivers, rewards and an end."""
     steps = [
         (
             Step(
@@ -58,7 +58,7 @@ def pictures_of(episode: Episode) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("images", [False, True])
 def test_a_round_trip(tmp_path: Path, images: bool) -> None:
-    """Numbers come back in 32 bits, images exactly or nearly, the rest as it was."""
+    """Numbers are rounded to 32 bits, video is nearly the same, and the rest is kept."""
     smooth_drive(tmp_path / "data", 30, seed=7, env="shapechanger/Car-v1")
     smooth_drive(tmp_path / "data", 4)
     done = export_recording(tmp_path / "data", tmp_path / "out", "lerobot", images=images)
@@ -82,7 +82,7 @@ def test_a_round_trip(tmp_path: Path, images: bool) -> None:
         jpegs = [[e.jpeg(step) for step in e.steps] for e in (before, after)]
         assert not images or jpegs[0] == jpegs[1]
         for one, two in zip(pictures_of(before), pictures_of(after), strict=True):
-            # The next image is brighter by 5, so that none is taken for another.
+            # Successive images differ by 5, so this test detects a wrong image.
             assert np.abs(one.astype(float) - two).mean() < 2.0
 
 
@@ -98,12 +98,12 @@ def test_long_episodes_and_several_videos(tmp_path: Path, monkeypatch: pytest.Mo
     expected = [in_32_bits(tuple(s.action[0] for s in e.steps)) for e in before]
     assert actions == expected
     first, second = pictures_of(before[2])[0], pictures_of(after[2])[0]
-    # The images are noise: two different ones have a mean difference of 85.
+    # The images are noise: two different images have a mean difference of 85.
     assert np.abs(first.astype(float) - second).mean() < 40.0
 
 
 def test_the_metadata(tmp_path: Path) -> None:
-    """Rate, names, units, tasks, places and statistics."""
+    """The metadata have the rate, names, units, tasks, positions and statistics."""
     smooth_drive(tmp_path / "data", 30)
     smooth_drive(tmp_path / "data", 10, body="car")
     export_recording(tmp_path / "data", tmp_path / "out", "lerobot", task="Drive.")
@@ -177,7 +177,7 @@ def first_without_picture(data: Path) -> None:
 def test_refused_exports(
     tmp_path: Path, make: Callable[[Path], object], options: dict[str, Any], message: str
 ) -> None:
-    """One sentence, and nothing is left behind."""
+    """The error is one sentence, and no folder is left behind."""
     make(tmp_path / "data")
     with pytest.raises(DemosError, match=message):
         export_recording(tmp_path / "data", tmp_path / "out", "lerobot", **options)

@@ -1,4 +1,4 @@
-"""Features of LeRobot datasets: each is imported as it is, or named in the report."""
+"""Features of LeRobot datasets: each feature is imported unchanged, or named in the report."""
 
 from __future__ import annotations
 
@@ -127,14 +127,14 @@ def test_names_and_units_of_values(
     about = episode.header
     assert about.notes == {"dataset": "set", "task": "drive"}
     assert {step.driver for step in episode.steps} == {"person"}
-    assert about.created == ""  # Unknown.
+    assert about.created == ""  # The start time is unknown.
     layout = about.action_layout
     assert (layout.names, [feature.unit for feature in layout]) == (expected, ["rad", "deg"])
     assert ("names of action do not fit its 2 values" in findings_of(done)) == noted
 
 
 def test_one_of_several_cameras(tmp_path: Path) -> None:
-    """Several cameras need a choice; its name may be short or complete."""
+    """Several cameras require a choice, by the short or the complete name."""
     camera = {"dtype": "video", "shape": [SIZE, SIZE, 3], "names": AXES}
     folder = write_set(tmp_path / "set", features={"observation.images.wrist": camera})
     with pytest.raises(DemosError, match=r"2 cameras: choose one of front, wrist by --camera"):
@@ -192,7 +192,7 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
     ],
 )
 def test_refused_imports(tmp_path: Path, options: Any, message: str) -> None:
-    """One sentence, and nothing is left behind."""
+    """The error is one sentence, and no folder is left behind."""
     folder = write_set(tmp_path / "set", **({} if callable(options) else options))
     if callable(options):
         options(folder)

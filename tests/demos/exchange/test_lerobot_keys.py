@@ -37,7 +37,7 @@ BOTH = [[(n, n) for n in range(8)], [(n, n) for n in range(8, 16)]]
         ({"options": ["-bf", "3", "-g", "12"]}, BOTH),
         # More images than steps.
         ({"fps": 10, "video_fps": 30, "pictures": [n // 3 for n in range(48)]}, BOTH),
-        # A video that begins later, as its entries say.
+        # A video that begins later, as `meta/episodes` states.
         (
             {
                 "options": ["-output_ts_offset", "0.5"],
@@ -92,7 +92,7 @@ def test_no_lost_picture_shifts_the_others(
 
 
 def place(number: int, **changes: Any) -> Any:
-    """Return a change of the entry of an episode; a key without "/" is of its video."""
+    """Return a change of an episode's row in `meta/episodes`; keys without "/" are the video's."""
 
     def change(entries: list[dict[str, Any]]) -> None:
         for key, value in changes.items():
@@ -115,14 +115,14 @@ def every(change: Any) -> Any:
 @pytest.mark.parametrize(
     ("options", "episodes", "reason"),
     [
-        # The video.
+        # Changes of the video.
         (
             {"options": ["-use_editlist", "0", "-bf", "2"]},
             [],
             "shows 0.1 to 0.9 s where meta/episodes says 0 to 0.8 s",
         ),
         ({"options": ["-output_ts_offset", "0.5"]}, [], "shows 0.5 to 1.3 s where"),
-        # Images after a lost one moved up, and nothing says which one is lost.
+        # After a lost image, the later images are shifted, so all episodes are left out.
         ({"pictures": [*range(5), *range(6, 16)]}, [], "shows 0 to 0.75 s where"),
         ({"places": place(0, to_timestamp=0.35)}, [1], "lacks an image at the time"),
         (
@@ -136,7 +136,7 @@ def every(change: Any) -> Any:
             "lacks an image at the time",
         ),
         ({"video_fps": 10, "pictures": range(8)}, [], "lacks an image at the time"),
-        # The keys.
+        # Changes of the keys.
         *(
             ({"rows": change}, [1], "episode 0: .*keys of episode 0 do not fit meta/episodes")
             for change in (
@@ -152,7 +152,7 @@ def every(change: Any) -> Any:
         ({"rows": every(lambda r: {"timestamp": r["frame_index"] / 10})}, [], "do not fit"),
         ({"rows": every(lambda r: {"timestamp": r["index"] / 20})}, [0], "keys of episode 1"),
         ({"rows": row(9, episode_index=None)}, [0], "keys of episode 1 do not fit"),
-        # The entries.
+        # Changes of `meta/episodes`.
         ({"places": place(0, length=7)}, [1], "keys of episode 0"),
         ({"places": place(0, length=9)}, [1], "episode 0: .* lacks an image at the time of a step"),
         ({"places": place(1, dataset_from_index=7)}, [0], "keys of episode 1"),
@@ -206,7 +206,7 @@ def test_a_video_that_is_cut_off(tmp_path: Path) -> None:
 def test_no_damage_shifts_the_pictures(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
-    """Whatever happens to its tables, no video shows another image at a step without a warning."""
+    """After any damage to a video's tables, no step has a wrong image without a warning."""
     options = ["-g", "4", "-bf", "2", "-movflags", "+faststart"]
     folder = write_set(tmp_path_factory.mktemp("damaged") / "set", options=options)
     content = bytearray((folder / VIDEO).read_bytes())
@@ -222,7 +222,7 @@ def test_no_damage_shifts_the_pictures(
 
 @pytest.mark.parametrize(("table", "offset"), [(b"stsz", 12), (b"elst", 8), (b"stsc", 16)])
 def test_a_video_that_claims_more_than_it_holds(tmp_path: Path, table: bytes, offset: int) -> None:
-    """A table of a few bytes, for which FFmpeg would allocate gigabytes, is refused unread."""
+    """A small table for which FFmpeg would allocate gigabytes is refused before FFmpeg opens it."""
     folder = write_set(tmp_path / "set")
     content = bytearray((folder / VIDEO).read_bytes())
     place = content.index(table) + offset
@@ -247,7 +247,7 @@ def test_a_damaged_image(tmp_path: Path) -> None:
 
 
 def test_a_video_of_too_many_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The limit holds before an image is decoded, whatever the file says."""
+    """Images above the limit are refused before they are decoded, for any stated size."""
     folder = write_set(tmp_path / "set")
     monkeypatch.setattr(video, "MAX_PIXELS", SIZE * SIZE - 1)
     pairs, context = pairs_of(folder)

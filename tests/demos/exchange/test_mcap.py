@@ -37,7 +37,7 @@ def of(found: list[Message], topic: str) -> list[tuple[int, dict[str, Any]]]:
 
 @pytest.fixture
 def exported(tmp_path: Path) -> Path:
-    """An episode with everything that a step can have."""
+    """Export an episode with all fields of a step."""
     layout = Layout((Feature("speed", "m/s", 0.0, 4.0), Feature("map", "1", shape=(2,))))
     steps = [
         Step(
@@ -108,7 +108,7 @@ def test_every_value_is_there(exported: Path) -> None:
     [
         ([None, None, 900, 1000], [0, 100, 900, 1000]),
         ([None, None], [0, 100]),
-        ([500, None, None, 300], [500, 600, 700, 300]),  # A clock that jumps back is shown.
+        ([500, None, None, 300], [500, 600, 700, 300]),  # Times are kept if the clock jumps back.
         ([-5, None, 250], [0, 100, 250]),
     ],
 )

@@ -1,4 +1,4 @@
-"""The way from records to episodes, which all formats share."""
+"""Records of any format become the steps of episodes."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
 def test_drives_are_whole_records_in_order_of_one_size_and_without_jumps(
     made: list[tuple[int | None, Any]],
 ) -> None:
-    """Other records count as missing when rates and jumps are computed."""
+    """Records that are left out count as missing for rates and pauses."""
     records = [
         ExchangeRecord(
             name=f"record {n}",

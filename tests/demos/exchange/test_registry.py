@@ -1,4 +1,4 @@
-"""A format is one file and an entry point, also outside of this package."""
+"""Formats of other packages, registered by an entry point."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Export followed by import is the identity."""
+"""An export followed by an import returns the same recording."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _TIMES = st.none() | st.integers(0, 2**62)
 def _steps(
     draw: st.DrawFn, image: tuple[int, int] | None, state: bool, grey: bool
 ) -> list[tuple[Step, bytes | None, list[str]]]:
-    """Steps with repeated images, and their marks."""
+    """Draw steps with repeated images, and their marks."""
     steps = []
     clock = 0
     for number in range(draw(st.integers(1, 4))):
@@ -159,7 +159,7 @@ def test_a_tub_round_trips(tmp_path: Path) -> None:
 
 
 def with_a_pause(data: Path) -> Path:
-    """Record eight steps, the last four of which come 7 s later and 5 ms slower each."""
+    """Record eight steps; after a pause of 7 s, the last four have periods longer by 5 ms."""
     times_ns = [n * 50_000_000 if n < 4 else 7 * 10**9 + n * 80_000_000 for n in range(8)]
     steps = [
         Step(action=(n / 10, 0.0), driver="person", state=(0.0, 0.0), captured_ns=0, decided_ns=at)
@@ -200,7 +200,7 @@ _MS = 10**6
 @pytest.mark.parametrize(
     ("clock", "captured_ns", "wall_ns"),
     [
-        # A third of the real time, and then the clock of the computer is set back.
+        # The twin ran at a third of real time, and then the computer's clock was set back.
         (
             "twin",
             [7_000 * _MS + n * 50 * _MS for n in range(16)],

@@ -38,7 +38,7 @@ def records(
 
 
 def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Converted]:
-    """Import a tub, and return the numbers of the records of each episode, by their steering."""
+    """Import a tub; return the record numbers of each episode, found from the steering."""
     out = folder.with_name(f"{folder.name}-data-{len(list(folder.parent.iterdir()))}")
     done = import_recording(folder, out, **options)
     return [[round(s.action[0] * 100) for s in e.steps] for e in all_of(out)], done
@@ -51,14 +51,14 @@ def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Converted]:
     chosen=st.data(),
     per_catalog=st.integers(1, 6),
 )
-def test_deletions_go_by_index(
+def test_deletions_refer_to_the_index(
     tmp_path_factory: pytest.TempPathFactory,
     first: int,
     count: int,
     chosen: st.DataObject,
     per_catalog: int,
 ) -> None:
-    """Whatever catalogs were removed, a deletion hits the record with its `_index`."""
+    """Deletions refer to the `_index` of records, also if catalogs were removed."""
     kept = chosen.draw(st.integers(first, first + count - 1))
     indexes = st.integers(first, first + count - 1)
     deleted = chosen.draw(st.sets(indexes.filter(lambda n: n != kept)))
@@ -74,7 +74,7 @@ def test_deletions_go_by_index(
 
 
 def test_a_tub_of_version_1(tmp_path: Path) -> None:
-    """Deletions go by the numbers of the records, and a restart of the car begins an episode."""
+    """Deletions refer to numbers of records, and a restart of the car begins an episode."""
     folder = tmp_path / "tub"
     folder.mkdir()
     for n in range(3, 15):
@@ -106,7 +106,7 @@ def lines(change: Callable[[list[bytes]], list[bytes]]) -> Callable[[Path], obje
 
 
 def fields(**changes: Any) -> Callable[[Path], object]:
-    """Return a change of fields of the records 0 and 4; those that become None are removed."""
+    """Return a change of fields of the records 0 and 4; fields that become None are removed."""
 
     def change(line: bytes) -> bytes:
         plain = json.loads(line)
@@ -191,7 +191,7 @@ def test_catalogs_in_another_order(tmp_path: Path) -> None:
 
 
 def test_pictures_of_other_records(tmp_path: Path) -> None:
-    """The number in the name of an image is compared with the record's."""
+    """A warning lists records whose image has another number in its name."""
     made = records(6)
     for record in made:
         record["cam/image_array"] = f"{record['_index'] + 2}_cam_image_array_.jpg"
@@ -246,7 +246,7 @@ def test_a_damaged_manifest(tmp_path: Path, lines: int) -> None:
 def test_rates_by_times(
     tmp_path: Path, period_ms: float, stated: object, hz: float | None, rate: float, finding: str
 ) -> None:
-    """Whole milliseconds do not round the rate; times that contradict a stated one do not count."""
+    """Millisecond times give exact rates; times that contradict a stated rate are left out."""
     made = records(60, period_ms=period_ms, **NO_IMAGE)
     folder = tub_folder(tmp_path / "tub", made, range(20, 30))
     if stated is not None:
@@ -260,31 +260,31 @@ def test_rates_by_times(
     if "their times are left out" in findings_of(done):
         assert {step.clock_ns for step in episode.steps} == {None}
         assert episode.header.created == ""
-    else:  # The ten deleted records took time, too.
+    else:  # The duration includes the ten deleted records.
         assert episode.seconds == pytest.approx(60 * period_ms / 1e3, rel=0.01)
         assert episode.header.created == "2023-11-14T22:13:20.000+00:00"
 
 
 @given(st.lists(st.floats(0.0, 1e12), min_size=1, max_size=30))
-def test_a_measured_rate_is_that_of_some_periods(periods_ns: list[float]) -> None:
+def test_a_measured_rate_is_within_the_periods(periods_ns: list[float]) -> None:
     hz = measured_hz(periods_ns)
     positive = [period for period in periods_ns if period > 0.0]
     if not positive:
         assert hz is None
         return
     assert hz is not None
-    zeros = len(periods_ns) / len(positive)  # Those of a coarse clock.
+    zeros = len(periods_ns) / len(positive)  # Ratio of all periods, with zeros of a coarse clock.
     assert 1e9 / max(positive) * (1 - 1e-9) <= hz <= 1e9 / min(positive) * zeros * (1 + 1e-9)
 
 
 def test_periods_of_two_kinds() -> None:
-    """The rate follows from the prevailing period, or else from the mean period."""
+    """The rate follows from the prevailing period; if no period prevails, from the mean."""
     assert measured_hz([50e6, 430e6] * 50) == pytest.approx(1 / 0.24)
     assert measured_hz([50e6] * 60 + [430e6] * 40) == pytest.approx(20.0)
 
 
 def test_times_that_jump(tmp_path: Path) -> None:
-    """A pause and a clock that was set back each begin an episode, and are reported by size."""
+    """A new episode begins, with a report, after a pause and where the clock was set back."""
     made = records(30)
     for record in made[10:]:
         record["_timestamp_ms"] += 120_000
@@ -314,7 +314,7 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
 
 
 def test_cameras_of_other_names(tmp_path: Path) -> None:
-    """The one camera is taken whatever its name, and of several one is chosen."""
+    """A single camera of any name is imported; several cameras require a choice."""
     names = {"cam/left": "{}_left.jpg", "cam/right": "{}_right.jpg"}
     for count in (1, 2):
         cameras = list(names)[:count]
@@ -349,7 +349,7 @@ def test_depth_and_lists_are_named(tmp_path: Path) -> None:
 
 
 def test_unknown_times_and_starts(tmp_path: Path) -> None:
-    """Records without a time leave the drive without times, never with the import's."""
+    """If a record lacks its time, the drive has no times and no start time."""
     made = records(4, **NO_IMAGE)
     made[2]["_timestamp_ms"] = None
     _, done = imported(tub_folder(tmp_path / "tub", made))

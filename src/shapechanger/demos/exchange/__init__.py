@@ -212,7 +212,7 @@ def _consecutive(chosen: Sequence[_Part], form: Format, notes: list[str]) -> lis
     if off_s > 0.5 / first.header.control_hz and not form.timed:
         notes.append(
             f"{form.title} computes the time of a step from its number and the rate; these times "
-            f"are wrong by up to {off_s:.4g} s."
+            f"are off by up to {off_s:.4g} s."
         )
     return parts
 

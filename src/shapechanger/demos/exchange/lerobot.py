@@ -1,11 +1,11 @@
-"""LeRobot datasets, version 3: our own with their layouts, and those of others.
+"""Import of LeRobot datasets, version 3, from Shapechanger or from other programs.
 
-Of a dataset of others, `action` becomes the action, the numbers of `observation.*` the state, and
-one camera the image; the driver is taken to be a person, who teleoperated the robot.
+In a dataset from another program, `action` becomes the action, the numbers of `observation.*` the
+state, and one camera the image. The driver is assumed to be a person, who teleoperated the robot.
 
-A row is the step that its `episode_index`, `frame_index`, `index` and `timestamp` and the entry of
-its episode in `meta/episodes` agree on, and its image is the one that the video shows at that time.
-What contradicts is left out: one of them is wrong, and nothing says which.
+The `episode_index`, `frame_index`, `index` and `timestamp` of a row must agree with each other and
+with the row of its episode in `meta/episodes`. The image of a step is the one that the video shows
+at that time. Episodes with a contradiction are left out, because either side may be wrong.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from shapechanger.layout import Feature, Layout
 _ACTION, _STATE, _REWARD, _TERMINATED = (
     base.COLUMNS[field]["lerobot"] for field in ("action", "state", "reward", "terminated")
 )
-# Largest difference between the time of a step and that of its image, s: `tolerance_s` of lerobot
+# Largest difference between the times of a step and of its image, s: `tolerance_s` of lerobot
 # 0.4.4. Rounding to 32 bits and to the ticks of the video is allowed in addition.
 _TOLERANCE_S: Final = 1e-4
 _ROUNDING: Final = 2.0**-23
@@ -44,8 +44,8 @@ _CAMERAS: Final = "observation.images."
 _NUMBERS: Final = re.compile(r"bool|u?int(8|16|32|64)|float(16|32|64)")
 _PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}")
 _MAX_PACKED: Final = 64  # Largest ratio of unpacked bytes to bytes of a file.
-_MOST: Final = 1 << 20  # Steps of an episode, and episodes.
-_ROWS: Final = 256  # In memory at once; fewer if the values of a column are large.
+_MOST: Final = 1 << 20  # Largest number of steps of an episode, and of episodes.
+_ROWS: Final = 256  # Rows in memory at once; fewer if the values of a column are large.
 
 _Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e5)]
 
@@ -84,7 +84,7 @@ class _Info(msgspec.Struct, kw_only=True):
 
 
 class _Entry(msgspec.Struct, kw_only=True):
-    """A row of `meta/episodes`: the last four columns are of the video, if there is one."""
+    """A row of `meta/episodes`; the last four fields are columns of the video, if there is one."""
 
     episode_index: Annotated[int, msgspec.Meta(ge=0, lt=_MOST)]
     length: Annotated[int, msgspec.Meta(ge=1, lt=_MOST)]
@@ -103,12 +103,12 @@ class _Dataset:
         features, version = self._info.features, self._info.codebase_version
         if not version.startswith("v3."):
             raise DemosError(
-                f"{folder} has version {version} of LeRobot's format, and only 3 can be imported: "
-                "lerobot.datasets.v30.convert_dataset_v21_to_v30 of lerobot 0.4 converts v2.1."
+                f"{folder} has version {version} of LeRobot's format, but only 3 can be imported: "
+                "convert 2.1 by lerobot.datasets.v30.convert_dataset_v21_to_v30 of lerobot 0.4."
             )
         sizes = {key: one.size for key, one in features.items() if one.is_number}
         if _ACTION not in sizes:
-            raise DemosError(f"{path} has no numeric feature {_ACTION!r}, so no action.")
+            raise DemosError(f"{path} has no numeric feature {_ACTION!r} to import as action.")
         states = [k for k in sizes if k.startswith(_OBSERVATION) and not k.startswith(_CAMERAS)]
         self._states = sorted(states, key=lambda key: key != _STATE)  # Stable: the state first.
         single = [key for key in (_REWARD, DONE, _TERMINATED) if sizes.get(key) == 1]
@@ -120,7 +120,7 @@ class _Dataset:
         self._size = files.image_size(features[camera].shape, (1, 3, 4)) if camera else None
         if camera and self._size is None:
             shape = list(features[camera].shape)
-            raise DemosError(f"{path}: {camera} has the shape {shape}, not of an image.")
+            raise DemosError(f"{path}: {camera} has the shape {shape}, not the shape of an image.")
         self._stored = [camera] if camera and features[camera].kind == "image" else []
         self._video = f"videos/{camera}/" if camera and not self._stored else ""
         for key, one in features.items():
@@ -138,32 +138,32 @@ class _Dataset:
             notes=notes,
         )
         self._entries = self._read_entries()
-        self._most_bytes = files.MAX_UNPACKED  # Of images in the tables, which can share one.
+        self._most_bytes = files.MAX_UNPACKED  # Limit on all images in the tables together.
         self._rows = self._find_rows()
         self._videos: dict[str, VideoTimes] = {}
 
     def read(self) -> Iterator[base.ExchangeEpisode]:
-        """Yield the episodes; one whose keys disagree is refused when its records are read."""
+        """Yield the episodes; iterating the records of one with contradictions raises an error."""
         path, header = self._folder / OURS, self._header
         section = files.read_json(path) if path.is_file() else None
         own = files.own_episodes(section, path, max(self._entries) + 1, header)
         for number, entry in self._entries.items():
             head, outcome, drivers = own[number] if own else (header, "", iter(()))
             task = {"task": ", ".join(entry.tasks)} if entry.tasks else {}
-            clock = "real" if head.clock == "none" else head.clock  # Times come from the dataset.
+            clock = "real" if head.clock == "none" else head.clock  # The dataset has times.
             head = replace(head, clock=clock, notes=header.notes | task | head.notes)
             records, name = self._records(entry, drivers), f"episode {number}"
             yield base.ExchangeEpisode(header=head, records=records, name=name, outcome=outcome)
 
     def _layout(self, keys: Sequence[str]) -> Layout:
-        """Return a layout for the values of features, in order, with their names and units."""
+        """Return the layout of the values of features, with their names and units."""
         found: list[Feature] = []
         for key in keys:
             feature, short = self._info.features[key], key.removeprefix(_OBSERVATION)
             prefix = "" if key in {_ACTION, _STATE} else f"{short}/"
             names = [name and prefix + name for name in _flat_names(feature.names)]
             if names and (len(set(names)) != feature.size or not all(names)):
-                text = f"The names of {key} do not fit its {feature.size} values: numbers do."
+                text = f"The names of {key} do not fit its {feature.size} values: using numbers."
                 self._context.report("note", text)
                 names = []
             units = _flat_names(feature.units)
@@ -171,7 +171,7 @@ class _Dataset:
         return Layout(tuple(found))
 
     def _read_entries(self) -> dict[int, _Entry]:
-        """Return the rows of `meta/episodes` by their number, in order."""
+        """Return the rows of `meta/episodes` in order, keyed by number of the episode."""
         fields = _Entry.__struct_encode_fields__[: None if self._video else 4]
         names = [name if n < 4 else self._video + name for n, name in enumerate(fields)]
         entries: list[_Entry] = []
@@ -190,10 +190,10 @@ class _Dataset:
         return dict(sorted(found.items()))
 
     def _find_rows(self) -> dict[float, list[Path]]:
-        """Return the files with rows of each episode.
+        """Return the files with rows of each episode, keyed by number of the episode.
 
         All files are searched, because LeRobot's converter to version 3 wrote wrong numbers of
-        files to `meta/episodes` (its issue 2401).
+        files to `meta/episodes` (LeRobot's issue 2401).
         """
         found, columns = defaultdict[float, list[Path]](list), set[str]()
         pattern = _PLACE.sub("*", glob.escape(self._info.data_path))
@@ -205,21 +205,24 @@ class _Dataset:
             columns |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
             self._most_bytes += _MAX_PACKED * path.stat().st_size
         for column in sorted(columns - self._info.features.keys()):
-            if not column.startswith("__index_level_"):  # Of pandas.
+            if not column.startswith("__index_level_"):  # Index columns of pandas.
                 self._context.report("note", f"The column {column} is not imported.")
         for number in sorted(found.keys() - self._entries.keys()):
             self._context.report("left out", f"{EPISODES} does not have it", f"episode {number:g}")
         return found
 
     def _video_name(self, entry: _Entry) -> str:
-        """Fill in the template of `info.json`, without Python's own formats."""
+        """Return the path of an episode's video by the template of `info.json`.
+
+        `str.format` is not used, because the template is untrusted.
+        """
         about = {"chunk_index": str(entry.video_chunk), "file_index": str(entry.video_file)}
         about["video_key"] = self._video.removeprefix("videos/").rstrip("/")
         template = self._info.video_path or ""
         return _PLACE.sub(lambda at: about[at[1]].rjust(int(at[2] or 0), "0"), template)
 
     def _times(self, name: str) -> VideoTimes:
-        """Return the times of a video, if they are those that its entries state."""
+        """Return the times of a video; refuse a video that does not fit its episodes."""
         if name in self._videos:
             return self._videos[name]
         times = read_times(files.inside(self._folder, name, self._folder / EPISODES))
@@ -231,11 +234,11 @@ class _Dataset:
         half_s = 0.5 * float(np.median(steps_s)) if len(steps_s) else 0.5 / self._info.fps
         shown_s = times.seconds[[0, -1]] + [0.0, 2.0 * half_s]
         told_s = spans_s[[0, -1], [0, 1]]
-        lost_s = (shown_s - told_s) * [1.0, -1.0]  # At the begin and at the end.
+        lost_s = (shown_s - told_s) * [1.0, -1.0]  # Missing time at the start and at the end.
         about = "{} shows {:.4g} to {:.4g} s where {} says {:.4g} to {:.4g} s".format(
             name, *shown_s, EPISODES, *told_s
         )
-        # If an image is lost, the ones after it moved up, and nothing says which one is lost.
+        # After a lost image, the later images are shifted, and it is unknown which one was lost.
         if lost_s.max() > half_s:
             raise DemosError(f"{about}.")
         if lost_s.min() < -half_s:
@@ -246,7 +249,7 @@ class _Dataset:
         return times
 
     def _filmed(self, entry: _Entry) -> Iterator[NDArray[np.uint8]]:
-        """Return the image of each step of an episode; refuse an episode that lacks one."""
+        """Yield the image of each step of an episode; refuse an episode with a missing image."""
         name = self._video_name(entry)
         times = self._times(name)
         at_s = entry.from_timestamp + np.arange(entry.length) / self._info.fps
@@ -258,7 +261,7 @@ class _Dataset:
         return read_pictures(self._folder / name, times, times.ticks[nearest])
 
     def _records(self, entry: _Entry, drivers: Iterator[Driver]) -> Iterator[base.ExchangeRecord]:
-        """Yield the records of an episode; refuse rows with other keys than expected."""
+        """Yield the records of an episode; refuse rows with unexpected keys."""
         number, rate_hz, first = entry.episode_index, self._info.fps, entry.dataset_from_index
         images = self._filmed(entry) if self._video else None
         where, done, read = f"episode {number}", 0, b""
@@ -311,9 +314,9 @@ def _bytes(image: Any) -> bytes:
 
 
 def _flat_names(plain: Any) -> tuple[str, ...]:
-    """Return names that are a list, lists in a dictionary, or a dictionary of their positions.
+    """Return the names of a feature's values in any of the three forms that datasets use.
 
-    All three are used: `["pan", "tilt"]`, `{"motors": ["pan", "tilt"]}`, `{"pan": 0, "tilt": 1}`.
+    The forms are `["pan", "tilt"]`, `{"motors": ["pan", "tilt"]}` and `{"pan": 0, "tilt": 1}`.
     """
     if isinstance(plain, dict):
         named = cast("dict[str, Any]", plain)
@@ -324,10 +327,10 @@ def _flat_names(plain: Any) -> tuple[str, ...]:
 
 
 def _batches(path: Path, columns: Sequence[str], number: float | None = None) -> Iterator[Any]:
-    """Yield the rows of a Parquet file, or at least those of an episode, a few at a time."""
+    """Yield a few rows of a Parquet file at a time; skip groups without episode `number`."""
     arrow, parquet = (files.library(name, "lerobot") for name in ("pyarrow", "pyarrow.parquet"))
     try:
-        # Otherwise a whole row group is in memory, which may be an episode of images.
+        # Without these options, a whole row group is read at once, which may have many images.
         with parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20) as file:
             about, size, largest, claimed = file.metadata, path.stat().st_size, 1, 0
             if missing := [key for key in columns if key not in file.schema_arrow.names]:
@@ -345,7 +348,7 @@ def _batches(path: Path, columns: Sequence[str], number: float | None = None) ->
             if claimed > files.MAX_UNPACKED + _MAX_PACKED * size or about.num_rows > size:
                 text = f"{size} bytes, but claims {about.num_rows} rows of {claimed} bytes"
                 raise DemosError(f"{path} has {text}.")
-            # Many rows may share one large value, which is in memory once for each.
+            # Many rows may share one large value, of which each row has a copy in memory.
             rows = max(1, min(_ROWS, files.MAX_UNPACKED // largest))
             yield from file.iter_batches(rows, row_groups=groups, columns=columns)
     except (arrow.ArrowException, OSError, UnicodeDecodeError) as error:

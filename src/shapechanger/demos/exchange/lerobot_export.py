@@ -8,9 +8,9 @@ meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet   tasks, and where 
 meta/shapechanger.json                                         headers and drivers of the episodes
 ```
 
-LeRobot takes the time of a step to be its number divided by the rate, so the robot's clock is not
-kept. Numbers have 32 bits. A state that nothing measured is the middle of its range, because one
-NaN would make all statistics of a dataset NaN.
+LeRobot computes the time of a step from its number and the rate, so the robot's clock is not kept.
+Numbers have 32 bits. A state that was not measured becomes the middle of its range, because one NaN
+would make all statistics of a dataset NaN.
 
 Statistics have LeRobot's keys (`compute_stats.py` of lerobot 0.4.4); docs/exchange.md says where
 their numbers differ.
@@ -42,18 +42,19 @@ OURS: Final = "meta/shapechanger.json"
 """Shapechanger's own file, which LeRobot ignores."""
 
 DONE: Final = COLUMNS["truncated"]["lerobot"]
-"""Whether an episode ended with a step, for any reason."""
+"""Column that is true for the last step of an episode that ended, for any reason."""
 
 _ACTION, _STATE, _CAMERA, _REWARD, _TERMINATED = (
     COLUMNS[field]["lerobot"] for field in ("action", "state", "frame", "reward", "terminated")
 )
 _DATA_PATH: Final = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _VIDEO_PATH: Final = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
-# LeRobot finds an image by its time in the file, in 32 bits and to 0.1 ms: enough for 1000 s.
+# LeRobot finds an image by its time in the file, a 32-bit number with an error of at most 0.1 ms.
+# This precision suffices for 1000 s.
 _VIDEO_FILE_S: Final = 500.0
-_ROWS: Final = 256  # In memory at once, because they may hold images.
-_SMALLEST_FRACTION: Final = 10_000  # Denominator of a rate: 19.98 Hz is 999/50.
-_INDEX: Final = "__index_level_0__"  # Column of pandas, with which LeRobot reads the tasks.
+_ROWS: Final = 256  # Rows in memory at once, which may have images.
+_SMALLEST_FRACTION: Final = 10_000  # Largest denominator of a rate: 19.98 Hz is 999/50.
+_INDEX: Final = "__index_level_0__"  # Index column of pandas, with which LeRobot reads the tasks.
 _QUANTILES: Final = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 _LEVELS: Final = 256
 
@@ -81,10 +82,10 @@ class _Dataset:
         self._rate = Fraction(header.control_hz).limit_denominator(_SMALLEST_FRACTION)
         self._fps = self._rate.numerator if self._rate.denominator == 1 else float(self._rate)
         self._tasks: list[str] = []
-        self._places: list[dict[str, Any]] = []  # A row for each episode.
+        self._places: list[dict[str, Any]] = []  # A row of `meta/episodes` for each episode.
         self._headers: list[dict[str, Any]] = []
         self._parts: list[_Columns] = []  # The numbers of all steps.
-        self._levels = np.zeros((_LEVELS, 3), np.int64)  # How many pixels have each level.
+        self._levels = np.zeros((_LEVELS, 3), np.int64)  # Number of pixels with each level.
         self._table: Any = None
         self._videos: list[VideoWriter] = []
 
@@ -130,7 +131,7 @@ class _Dataset:
         self.steps += count
 
     def _new_video(self) -> VideoWriter:
-        """Return the video of the next episode: a new one once the last one is full."""
+        """Return the video for the next episode: the last one, or a new one if that is full."""
         for last in self._videos[-1:]:
             if last.frames < _VIDEO_FILE_S * self._rate:
                 return last
@@ -145,7 +146,7 @@ class _Dataset:
     def _with_images(
         self, episode: ExchangeEpisode, video: VideoWriter | None, levels: NDArray[np.int64]
     ) -> Iterator[tuple[Step, bytes | None]]:
-        """Yield steps with their images, and add the images to the video and the levels."""
+        """Yield steps with their JPEGs, and add the images to the video and to `levels`."""
         shown, counts = np.empty(0, np.uint8), np.zeros_like(levels)
         for record, pixels in decoded_images(episode, "LeRobot"):
             if pixels is not None:
@@ -158,7 +159,7 @@ class _Dataset:
             yield record.step, record.jpeg
 
     def _columns(self, steps: Sequence[Step], first: int, task: str) -> _Columns:
-        """Return the numbers of steps, the first one with a number, shape (n, k) each."""
+        """Return the columns of steps, shape (n, k) each; `first` is the number of the first."""
         frames = np.arange(first, first + len(steps))[:, None]
         columns: _Columns = {_ACTION: _in_32_bits([step.action for step in steps])}
         if layout := self._header.state_layout:
@@ -178,7 +179,7 @@ class _Dataset:
         }
 
     def _write_rows(self, columns: _Columns, jpegs: Sequence[bytes | None], name: str) -> None:
-        """Append rows to the table, which the first ones create."""
+        """Append rows to the table; the first call creates the table."""
         arrow = self._arrow
         stored: dict[str, Any] = {}
         for key, values in columns.items():
@@ -201,7 +202,7 @@ class _Dataset:
         self._table.write_table(table)
 
     def _described(self, columns: _Columns) -> dict[str, dict[str, Any]]:
-        """Return the features, by the columns of some rows."""
+        """Return the features for `info.json`, with types and sizes from the columns."""
         found: dict[str, dict[str, Any]] = {
             key: {"dtype": str(values.dtype), "shape": [values.shape[1]], "names": None}
             for key, values in columns.items()
@@ -244,7 +245,7 @@ class _Dataset:
             "total_episodes": len(self._places),
             "total_frames": self.steps,
             "total_tasks": len(self._tasks),
-            "chunks_size": 1000,  # These three are for LeRobot, which continues the dataset.
+            "chunks_size": 1000,  # LeRobot needs this and the next two to append episodes.
             "data_files_size_in_mb": 100,
             "video_files_size_in_mb": 200,
             "fps": self._fps,
@@ -260,7 +261,7 @@ class _Dataset:
 
 
 def _in_32_bits(values: Any) -> NDArray[np.float32]:
-    """Round numbers; what is too large becomes infinite, and is refused then."""
+    """Round numbers to 32 bits; numbers that are too large become infinite."""
     with np.errstate(over="ignore"):
         return np.asarray(values, np.float64).astype(np.float32)
 
@@ -268,7 +269,7 @@ def _in_32_bits(values: Any) -> NDArray[np.float32]:
 def _statistics(
     parts: Sequence[_Columns], levels: NDArray[np.int64]
 ) -> dict[str, dict[str, list[Any]]]:
-    """Return the statistics of numbers, and of images by how many pixels have each level."""
+    """Return the statistics of columns, and of images from the numbers of pixels by level."""
     found: dict[str, dict[str, list[Any]]] = {}
     for key in parts[0]:
         values = np.concatenate([part[key] for part in parts]).astype(np.float64)
@@ -284,7 +285,7 @@ def _statistics(
 
 
 def _stats_of(values: NDArray[np.float64], weights: NDArray[np.int64]) -> _Columns:
-    """Return the statistics of columns, shape (n, k), with the weight of each value: (k,) each."""
+    """Return weighted statistics of columns, shape (k,) each; both arrays have shape (n, k)."""
     mean = np.average(values, axis=0, weights=weights)
     quantiles = np.quantile(
         values, list(_QUANTILES.values()), axis=0, method="inverted_cdf", weights=weights

@@ -2,17 +2,17 @@
 
 ```
 /camera    foxglove.CompressedImage   the JPEG as recorded, once for the steps that share it
-/state     shapechanger.State         values by name; those that nothing measured are left out
-/action    shapechanger.Action        the decided action, by name
-/applied, /wanted                     the same, where they are known
+/state     shapechanger.State         values, keyed by name, without values that were not measured
+/action    shapechanger.Action        the decided action, keyed by name
+/applied, /wanted                     the applied and the wanted action, if known
 /reward    shapechanger.Reward        the reward and its terms
 /step      shapechanger.Step          number, driver, ends, stop reason, marks, why it was dropped
 ```
 
-Messages are JSON, and their schemas state the units. Log times are on the robot's clock, ns:
-of the capture for images and states, of the decision for actions, and never moved. Where a time
-is unknown, the step follows the one before at the rate of the episode, from 0 on. The header of the
-episode is the metadata `shapechanger`. Format: mcap.dev/spec.
+Messages are JSON, and their schemas state the units. Log times are unchanged times of the robot's
+clock, ns: the time of the capture for images and states, and of the decision for actions. A step
+with an unknown time follows the step before after one period; a first step is at 0. The header of
+the episode is the metadata `shapechanger`. Format: mcap.dev/spec.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _SCHEMAS: Final[dict[str, dict[str, Any]]] = {
         **dict.fromkeys(("terminated", "truncated"), _FLAG),
         "marks": {"type": "array", "items": _TEXT},
     },
-    # Foxglove's own, by which its panels know an image: github.com/foxglove/foxglove-sdk.
+    # Foxglove's schema, by which its panels recognize images: github.com/foxglove/foxglove-sdk.
     "camera": {
         "timestamp": {"type": "object", "properties": {"sec": _WHOLE, "nsec": _WHOLE}},
         **dict.fromkeys(("frame_id", "format"), _TEXT),
@@ -55,14 +55,14 @@ _KINDS: Final = {
 
 
 def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
-    """Write episodes, each to a file of its own; return the number of steps."""
+    """Write each episode to a separate file, and return the number of steps."""
     steps = 0
     for number, episode in enumerate(episodes, 1):
         with (folder / f"episode-{number:04d}.mcap").open("wb") as file:
             writer = library("mcap.writer").Writer(file)
             writer.start(profile="", library="shapechanger")
             steps += _write_messages(episode, writer)
-            outcome = episode.outcome.encode(errors="replace").decode()  # A lone surrogate.
+            outcome = episode.outcome.encode(errors="replace").decode()  # Lone surrogates.
             about = {"header": json.dumps(episode.header.to_json()), "outcome": outcome}
             writer.add_metadata("shapechanger", about)
             writer.finish()
@@ -98,7 +98,7 @@ def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
 def _messages(
     record: ExchangeRecord, is_new: bool, seen_ns: int, layouts: Mapping[str, Layout]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the topics and the messages of a step."""
+    """Yield the topic and the content of each message of a step."""
     step = record.step
     if is_new and record.jpeg is not None:
         sec, nsec = divmod(seen_ns, _NS_PER_S)
@@ -117,7 +117,7 @@ def _messages(
 
 
 def _properties(layout: Layout) -> dict[str, Any]:
-    """Return the JSON schema of each feature, with its unit and range as description."""
+    """Return the JSON schema of each feature, which describes its unit and range."""
     found: dict[str, Any] = {}
     for feature in layout:
         ends = ("" if math.isinf(end) else f"{end:g}" for end in (feature.low, feature.high))
@@ -128,14 +128,14 @@ def _properties(layout: Layout) -> dict[str, Any]:
 
 
 def _by_name(layout: Layout, values: Sequence[float]) -> dict[str, Any]:
-    """Return values by the name of their feature; a number that is not finite is left out."""
+    """Return values, keyed by name of the feature, without single numbers that are not finite."""
     parts = {name: list(map(_known, values[place])) for name, place in layout.slices.items()}
     named = {f.name: parts[f.name] if f.shape else parts[f.name][0] for f in layout}
     return {name: part for name, part in named.items() if part is not None}
 
 
 def _known(value: float) -> float | None:
-    """Return a number as JSON can hold it: null if it is not finite."""
+    """Return a number, or None (JSON's null) if it is not finite."""
     return value if math.isfinite(value) else None
 
 

@@ -1,11 +1,10 @@
-"""Minari datasets: lossless if exported by Shapechanger, and as far as possible from others.
+"""Minari datasets: lossless from Shapechanger, and as complete as possible from other programs.
 
-An observation is the image, the state, or a dictionary of both; the last one is repeated, because
-Minari needs one more than there are steps. An image is stored as the recorded JPEG, which Minari
-decodes on reading; it does not for images below 32 pixels, which are not exported. `infos/frame` is
-the index of the image in the episode, the same for steps that share an image, and `infos/step`
-contains all fields without a separate column, as JSON. An unknown reward is NaN. `metadata.json`
-has the headers of the episodes.
+An observation is the image, the state, or a dictionary with an image and a state. The last one is
+repeated, because Minari needs one more than there are steps. An image is stored as the recorded
+JPEG, which Minari decodes on reading, except below 32 pixels; such images are not exported.
+`infos/frame` is the index of the image in the episode, and `infos/step` contains all fields without
+a separate column, as JSON. An unknown reward is NaN. `metadata.json` has the episodes' headers.
 
 Minari's own writer (`MinariStorage.update_episodes`) is not used: it decodes and encodes each image
 again at JPEG quality 75, and needs the whole episode in memory.
@@ -48,10 +47,10 @@ _ACTION, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
 )
 _IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys left out of `infos/step`.
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
-_CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
-_MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
-_MIN_JPEG: Final = 32  # Pixels. Minari 0.5 stores smaller images as pixels (`is_image_space`).
-_DEEP: Final = ("uint16", "int16", "uint32")
+_CHUNK: Final = 64  # Steps in memory at once.
+_MIN_PICTURE: Final = 8  # Smallest width and height of images, pixels; smaller grids are maps.
+_MIN_JPEG: Final = 32  # Minari 0.5 stores narrower or lower images as pixels (`is_image_space`).
+_DEEP: Final = ("uint16", "int16", "uint32")  # Types of depth images.
 _DESCRIPTION: Final = (
     "Episodes recorded by Shapechanger, and exported without changes: images are the recorded "
     "JPEGs, numbers have 64 bits, and the last observation of an episode is repeated."
@@ -59,7 +58,7 @@ _DESCRIPTION: Final = (
 
 
 class _Rest(msgspec.Struct):
-    """Fields of a step without a column, in `infos/step` of datasets from Shapechanger."""
+    """Content of `infos/step` in our datasets: fields of a step that have no column."""
 
     step: dict[str, Any]
     marks: tuple[str, ...]
@@ -77,7 +76,7 @@ class _Metadata(msgspec.Struct, kw_only=True):
 
 
 class _Space(msgspec.Struct, kw_only=True):
-    """A space of Gymnasium, as Minari writes it; each type has some of the fields."""
+    """A space of Gymnasium in Minari's JSON; each type of space has some of these fields."""
 
     type: str
     dtype: str = ""
@@ -90,7 +89,7 @@ class _Space(msgspec.Struct, kw_only=True):
     subspaces: dict[str, _Space] | list[_Space] = []
 
     def leaves(self, column: str) -> Iterator[tuple[str, _Space]]:
-        """Yield the spaces in it with their columns, in the order of Minari's files."""
+        """Yield the column and space of each leaf, in the order of Minari's files."""
         match self.subspaces:
             case dict() as named:
                 inner = sorted(named.items())
@@ -102,7 +101,7 @@ class _Space(msgspec.Struct, kw_only=True):
             yield column, self
 
     def bounds(self) -> list[list[float]]:
-        """Return the bounds of its numbers; [] for anything else, and for too many."""
+        """Return the low and high bounds of the numbers; [] if not numeric, or too many."""
         shape, low, high = self.shape, self.low, self.high
         match self.type:
             case "Box":
@@ -125,20 +124,20 @@ class _Space(msgspec.Struct, kw_only=True):
         return [np.broadcast_to(end, size).tolist() for end in ends]
 
     def image_size(self) -> tuple[int, int] | None:
-        """Return the width and height of its images; None if it has no images."""
+        """Return the width and height of an image space; None for other spaces."""
         size = files.image_size(self.shape) if (self.type, self.dtype) == ("Box", "uint8") else None
         return size if size and min(size) >= _MIN_PICTURE else None
 
 
 def _metadata_of(folder: Path) -> Path | None:
-    """Return the metadata in `data` or in the folder itself, next to the file of the data."""
+    """Return the path of the metadata in `data` or in the folder itself; None without a file."""
     paths = (folder / _DATA / _METADATA, folder / _METADATA)
     return next((path for path in paths if path.is_file()), None)
 
 
 @contextmanager
 def _opened(path: Path) -> Generator[Any]:
-    """Open an HDF5 file for reading; h5py raises one of these errors for inconsistent bytes."""
+    """Open an HDF5 file for reading, and refuse damaged files."""
     kinds, wrong = (OSError, RuntimeError, KeyError), f"{path} is not an intact HDF5 file"
     with (
         translate_errors(*kinds, to=lambda error: DemosError(f"{wrong}: {error}.")),
@@ -169,7 +168,7 @@ class _Dataset:
             raise DemosError(f"{folder} is stored as {about.data_format!r}: only 'hdf5' is read.")
         self._context, self._count = context, about.total_episodes
         self._main = files.inside(path.parent, _MAIN, path)
-        self._values = self._main.stat().st_size  # That the file can still hold.
+        self._values = self._main.stat().st_size  # Most values that unread episodes can have.
         if self._count > self._values:
             raise DemosError(f"{path} claims {self._count} episodes, but {_MAIN} is smaller.")
         texts = {_OBSERVATIONS: about.observation_space, _ACTION: about.action_space}
@@ -205,7 +204,7 @@ class _Dataset:
         self._own = files.own_episodes(about.ours, path, self._count, self._header)
 
     def _features(self, leaves: Mapping[str, _Space]) -> dict[str, list[Feature]]:
-        """Return the features of each numeric leaf, keyed by column; other leaves are reported."""
+        """Return the features of numeric leaves, keyed by column, and report other leaves."""
         found: dict[str, list[Feature]] = {}
         for column, space in leaves.items():
             part, _, key = column.partition("/")
@@ -246,24 +245,24 @@ class _Dataset:
         columns = {name: arrays[name] for name in names}
         steps = len(columns[_TERMINATED])
         for name, one in columns.items():
-            # HDF5 unpacks whole chunks.
+            # HDF5 unpacks a whole chunk to read a row.
             row, chunk = one.nbytes // max(1, len(one)), math.prod(one.chunks or ())
             if (unpacked := max(row, chunk * one.dtype.itemsize)) > MAX_UNPACKED:
                 raise DemosError(f"{where}: {name!r} unpacks to {unpacked} bytes: too many.")
-            # The last observation follows the last step.
+            # An episode may have one more observation than steps.
             if len(one) not in {steps, steps + name.startswith(_OBSERVATIONS)}:
                 raise DemosError(f"{where}: {name!r} has {len(one)} entries for {steps} steps.")
             shape, fits = one.shape[1:], True
             if name in sizes:
                 fits = one.dtype.kind in "biuf" and math.prod(shape) == sizes[name]
-            elif name in self._images and len(shape) > 1:  # Others are JPEGs, padded or not.
+            elif name in self._images and len(shape) > 1:  # Other rows are JPEGs.
                 fits = one.dtype == np.uint8 and shape == self._images[name].shape
             if not fits:
                 raise DemosError(f"{where}: {name!r} has {one.dtype} {shape}, unlike its space.")
         stated = file[where].attrs.get("total_steps", steps)
         if not np.array_equal(np.ravel(stated), [steps]):
             raise DemosError(f"{where} has {steps} steps, but its total_steps is {stated}.")
-        # HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
+        # HDF5 can claim arrays of any size without bytes, and one array under many names.
         self._values -= 3 * steps
         if self._values < 0:
             raise DemosError(f"{_MAIN} claims at least {3 * steps} values, but is smaller.")
@@ -308,7 +307,7 @@ def _numbers(row: Mapping[str, Any], names: Iterable[str]) -> list[float]:
 
 
 def _last_colours(stored: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return an image with its three colours last."""
+    """Return an image as three colours, shape (height, width, 3)."""
     pixels = np.atleast_3d(stored)
     pixels = pixels if pixels.shape[-1] in {1, 3} else np.moveaxis(pixels, 0, -1)
     return np.repeat(pixels, 3 // pixels.shape[-1], -1)
@@ -381,8 +380,8 @@ def _write(
 def _write_episode(group: Any, episode: base.ExchangeEpisode, greys: set[bool]) -> list[Step]:
     """Write the columns of an episode to its group, and return its steps.
 
-    An episode without an end is truncated at its last step, so that learners do not treat the next
-    episode as its continuation. Whether images are grey is added to `greys`.
+    If the last step does not end the episode, it is marked as truncated, so that learners do not
+    continue with the next episode. `greys` collects whether images are grey.
     """
     header, variable = episode.header, library("h5py").vlen_dtype(np.uint8)
     steps, rests, frames = list[Step](), list[str](), list[int]()
@@ -404,7 +403,7 @@ def _write_episode(group: Any, episode: base.ExchangeEpisode, greys: set[bool]) 
             where = f"of step {len(steps)} of {episode.name}"
             greys.add(is_grey(jpeg, where))
             if len(greys) > 1:
-                raise DemosError(f"Minari needs grey or coloured images, and not both {where}.")
+                raise DemosError(f"Minari cannot mix grey and coloured images: image {where}.")
         show(jpeg)
         steps.append(record.step)
         rest = {n: v for n, v in record.step.to_json().items() if n not in _IN_COLUMNS}

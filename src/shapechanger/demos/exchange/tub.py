@@ -1,8 +1,8 @@
 """Donkeycar tubs: import of versions 1 and 2, export of version 2.
 
 `user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, as in
-Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is the action of a policy.
-In the other modes `pilot/...` drives, except for the person's throttle in "local_angle".
+Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is the action that a policy
+proposed. In other modes the policy drives, but in "local_angle" the person sets the throttle.
 
 Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
 metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted
@@ -38,13 +38,13 @@ from shapechanger.layout import Layout
 
 _MANIFEST: Final = "manifest.json"
 _IMAGES: Final = "images"
-_LOOP_HZ: Final = "DRIVE_LOOP_HZ"  # Donkeycar's name of the rate.
+_LOOP_HZ: Final = "DRIVE_LOOP_HZ"  # Steps per second in Donkeycar's settings.
 _RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 _IMAGE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
 _ACTIONS: Final = Layout((base.COMMANDS["steering"], base.COMMANDS["throttle"]))
 _USER, _PILOT = ([f"{who}/{axis}" for axis in ("angle", "throttle")] for who in ("user", "pilot"))
 _IMAGE, _MODE = base.COLUMNS["frame"]["tub"], base.COLUMNS["driver"]["tub"]
-_CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
+_CATALOG_LENGTH: Final = 1000  # Records of a catalog, as Donkeycar writes them.
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
 _NUMBERS: Final = ("float", "int", "boolean")
@@ -58,7 +58,7 @@ Time = Annotated[float, Meta(gt=-_MAX_MS, lt=_MAX_MS)] | None
 
 
 class _Record(Struct):
-    """The columns with the same meaning in all tubs."""
+    """Columns that have the same meaning in all tubs."""
 
     time_ms: Time = field(default=None, name="_timestamp_ms")
     mode: str = field(default="user", name=_MODE)
@@ -85,17 +85,17 @@ class _Tub(Struct):
     rate: Any = field(default=None, name=_LOOP_HZ)
     records: dict[int, Fields] = {}
     deleted: list[int] = []
-    is_unix: bool = True  # Otherwise times begin at 0 with each start of the car.
+    is_unix: bool = True  # Whether times are Unix times; otherwise 0 is the start of the car.
 
 
 def _numbered(folder: Path) -> list[tuple[int, str]]:
-    """Return the numbers and files of the records of version 1."""
+    """Return the number and file name of each record in a tub of version 1."""
     names = (path.name for path in folder.glob("record_*.json"))
     return sorted((int(m[1]), m[0]) for m in map(_RECORD_NAME.fullmatch, names) if m)
 
 
 def _read_v1(folder: Path, context: base.ImportContext) -> _Tub:
-    """Read a file for each record; without Unix times, each start of the car is a session."""
+    """Read a tub of version 1; without Unix times, a session begins where time runs backwards."""
     path, exclude = folder / "meta.json", folder / "exclude.json"
     tub = files.read_json(path, _Tub) if path.is_file() else _Tub()
     tub.deleted = files.read_json(exclude, list[int]) if exclude.is_file() else []
@@ -119,7 +119,7 @@ def _read_v1(folder: Path, context: base.ImportContext) -> _Tub:
 
 
 def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
-    """Read the catalogs that the manifest names, in the order of the records' `_index`."""
+    """Read a tub of version 2, with its records in the order of their `_index`."""
     path = folder / _MANIFEST
     lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
     kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
@@ -214,7 +214,7 @@ def _float(value: Any) -> float:
 
 
 def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.ExchangeRecord:
-    """Return a record; it has a fault if it has no valid action."""
+    """Return a record, with a fault if its action is missing or invalid."""
     known, fault = _Record(), ""
     try:
         known = msgspec.convert(fields, _Record)
@@ -241,7 +241,7 @@ def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.Exchange
 def _find_images(
     records: list[base.ExchangeRecord], names: list[Any], images: Path, context: base.ImportContext
 ) -> None:
-    """Find the image of each record by its name; the others get a fault."""
+    """Set the image of each record from its name, or a fault if the name is invalid."""
     shown = Counter(str(name) for name, one in zip(names, records, strict=True) if not one.fault)
     for record, name in zip(records, names, strict=True):
         if record.fault:
@@ -249,7 +249,7 @@ def _find_images(
         if not name or not isinstance(name, str):
             record.fault = "no image"
             continue
-        # Version 1 writes whole paths of the robot for the type "image".
+        # For the type "image", version 1 writes absolute paths on the robot.
         place = PurePath(name).name if PurePath(name).is_absolute() else name
         record.frame, record.image = name, images / place
         if not files.is_inside(images, place):
@@ -327,8 +327,9 @@ def _timed(
 ) -> Iterator[tuple[Step, bytes | None, int]]:
     """Yield the steps with their images and ascending Unix times, ns.
 
-    Steps of a simulated drive get the times of its clock, because the recorder's times depend on
-    the speed of the simulation; steps without a time follow at the rate of the episode.
+    Steps of a simulated drive get the times of the simulated clock, because the recorder's times
+    depend on the speed of the simulation. A step without a time gets the time of the step before
+    plus one period.
     """
     header = episode.header
     is_simulated = header.clock == "twin" or (header.clock == "none" and header.env)

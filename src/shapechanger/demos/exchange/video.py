@@ -1,8 +1,7 @@
 """Write and read videos of datasets.
 
 An untrusted video is opened as a file object and as MP4 only, so that it cannot refer to other
-files. Its images are decoded up to a limit of pixels, and damaged images are refused instead of
-being concealed.
+files. Images with too many pixels and damaged images are refused.
 """
 
 from __future__ import annotations
@@ -21,24 +20,24 @@ from shapechanger.demos.exchange.files import MAX_UNPACKED, library
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError, OutputError, translate_errors
 
-_MAX_SAMPLES: Final = 1 << 21  # Of a video: 10 hours at 60 Hz, and 50 MB of FFmpeg's index.
+_MAX_SAMPLES: Final = 1 << 21  # Images of a video: 10 hours at 60 Hz. FFmpeg's index has 50 MB.
 
 
 class VideoWriter:
-    """Writer of a video in H.264, with 4:2:0 colours and a constant rate, images per second.
+    """Writer of an H.264 video with 4:2:0 colours and a constant rate.
 
     Attributes:
         frames: Number of images written.
     """
 
-    # The quality of `crf` is constant, 0 to 51; see the measured error in docs/exchange.md. Each
-    # second image is a key frame, so that learners can read any quickly.
+    # `crf` is the quality, from 0 (lossless) to 51; docs/exchange.md has the measured error. Every
+    # second image is a key frame, so that learners can read single images quickly.
     _CODING: Final = {"crf": "18", "g": "2", "bf": "0"}
 
     def __init__(self, path: Path, size: tuple[int, int], rate: Fraction) -> None:
         width, height = size
         if width % 2 or height % 2:
-            text = f"A video needs even sizes, and not {width} x {height} pixels"
+            text = f"A video needs an even width and height, got {width} x {height} pixels"
             raise DemosError(f"{text}: export them with --images.")
         self.frames = 0
         self._path = path
@@ -70,7 +69,7 @@ class VideoTimes(NamedTuple):
 
     Attributes:
         ticks: Times, ascending, shape (n,).
-        keys: Decoding time of the key frame from which to decode each image, shape (n,).
+        keys: Decoding times of the key frames from which to decode the images, shape (n,).
         tick_s: Length of a tick, s.
         size: Width and height of the images, pixels.
     """
@@ -87,10 +86,10 @@ class VideoTimes(NamedTuple):
 
 
 def _require_whole(path: Path) -> None:
-    """Refuse an MP4 file that is cut off, or whose tables claim far more than it can hold.
+    """Refuse an MP4 file that is cut off, or whose tables claim far more than it can contain.
 
-    FFmpeg allocates an entry for each sample that is claimed, again for each edit, and instead of
-    samples of sound for each 1024 in a chunk, before any is read (ISO/IEC 14496-12, 4.2, 8.6-8.8).
+    Before FFmpeg reads a sample, it allocates an entry for each claimed sample, and again for each
+    edit; for sound, an entry for each 1024 samples of a chunk (ISO/IEC 14496-12, 4.2, 8.6-8.8).
     """
     at, size, tables = 0, path.stat().st_size, bytearray()
     with path.open("rb") as file:
@@ -141,7 +140,7 @@ def _opened(path: Path) -> Generator[tuple[Any, Any]]:
         if stream is None or stream.codec_context is None:
             raise DemosError(f"{path} has no images that can be decoded: restore it.")
         stream.codec_context.options = strict
-        stream.codec_context.thread_count = 1  # Several threads would lose errors of slices.
+        stream.codec_context.thread_count = 1  # Several threads would miss errors in slices.
         yield container, stream
 
 
@@ -176,10 +175,7 @@ def read_times(path: Path) -> VideoTimes:
 def read_pictures(
     path: Path, times: VideoTimes, wanted: NDArray[np.int64]
 ) -> Generator[NDArray[np.uint8]]:
-    """Yield the images of an MP4 video at some of its times, which ascend, in ticks.
-
-    Their shape is (height, width, 3).
-    """
+    """Yield the images of an MP4 video at ascending times in ticks, shape (height, width, 3)."""
     with _opened(path) as (container, stream):
         key = times.keys[np.searchsorted(times.ticks, wanted[0])]
         container.seek(int(key), stream=stream)
