@@ -130,7 +130,7 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
         ("transfer Finger Finger --target-options '{'", "must be JSON"),
         ("play Ant --policy none.safetensors", "There is no policy file none.safetensors"),
         ("play Ant --policy referense", "did you mean reference?"),
-        ("play Ant --episodes 0", "at least one episode"),
+        ("play Ant --episodes 0", "must be at least 1"),
         ("train Ant --seed -1", "A seed is a whole number from 0"),
         ("transfer Ant BigAnt --map m --rule a=b", "leave out --rule"),
         (
@@ -160,8 +160,11 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
         ("train Car --teachr x", "matches '--teachr'. Did you mean '--teacher'?"),
         ("demos cut x --frm 4", "Did you mean '--from'?"),
         ("robot camera --profile x", "No option of `shapechanger robot camera` matches"),
-        ("train Ant --bodies 3 --learner ppo-run", "ppo-run learns in one body: give --learner l"),
-        ("train Ant --bodies 3 --body BigAnt", "--bodies takes a number above 0, and no --body"),
+        (
+            "train Ant --bodies 3 --learner ppo-run",
+            "ppo-run learns in one body. With --bodies, give",
+        ),
+        ("train Ant --bodies 3 --body BigAnt", "--bodies must be above 0, and excludes --body"),
         ("train Car --bodies 3", "belongs to no family to draw from"),
         ("train HalfCheetah --bodies 70", "70 bodies need as many envs, and there are 64"),
         (
@@ -176,9 +179,9 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
         ("train Ant --out file/policy.safetensors", "Cannot write file"),
         (
             "train Ant --set gamma=0.9 --set n_epochs=5",
-            "--set is given twice: give it once, with all its values after it.",
+            "--set must be given once, with all its values after it.",
         ),
-        ("robot serve car --policy a.onnx --policy=b.onnx", "one policy drives at a time"),
+        ("robot serve car --policy a.onnx --policy=b.onnx", "--policy must be given once"),
     ],
 )
 def test_mistakes_give_one_sentence(

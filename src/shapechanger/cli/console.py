@@ -26,7 +26,7 @@ def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
 
 
 def say(text: str, *, stderr: bool = False) -> None:
-    """Print text verbatim; only the terminal wraps its lines."""
+    """Print text verbatim, without wrapping its lines."""
     plain_console(stderr=stderr).print(text, soft_wrap=True)
 
 
@@ -45,7 +45,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def command_line() -> str:
-    """Return the command that runs, as typed in a shell."""
+    """Return the running command as it would be typed in a shell."""
     return shlex.join(["shapechanger", *sys.argv[1:]])
 
 
@@ -53,7 +53,7 @@ _LINE_EVERY_S: Final = 10.0
 
 
 class StudyProgress:
-    """Progress of several runs, from the steps of each, on a console or on standard error."""
+    """Shows the progress of several runs, whose `steps` are given, on standard error by default."""
 
     def __init__(self, steps: dict[str, int], console: Console | None = None) -> None:
         self._steps = steps
@@ -78,7 +78,7 @@ class StudyProgress:
         self._bar.stop()
 
     def __call__(self, run: str, steps: int, ended: bool) -> None:
-        """Report that `run` has done `steps` steps; one that has ended does no more."""
+        """Show that `run` has done `steps` steps, or all of its steps if it has ended."""
         if run in self._ended:
             return
         self._done[run] = self._steps[run] if ended else min(steps, self._steps[run])
@@ -98,4 +98,4 @@ class StudyProgress:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Long work was interrupted; the message tells how to resume it."""
+    """A long command was interrupted; the message explains how to resume it."""

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 _PACKAGE: Final = "shapechanger"
 # Extras that combine others, or are for developers of Shapechanger.
 _NOT_LISTED: Final = ("all", "dev")
-# Longer than any driver needs for one image, s.
+# Time limit for rendering one image, s.
 _PATIENCE_S: Final = 120
-# Drawn in a separate process, because a broken driver ends the process.
+# Runs in a separate process, because a broken OpenGL driver ends its process.
 _DRAW: Final = """
 from shapechanger.envs.opengl import choose_gl
 choose_gl()
@@ -78,7 +78,7 @@ def examine_machine(
             (f"extra {extra}" if extra else "core", _extra(parsed, extra, installed))
             for extra in ("", *extras)
         ),
-        # An extra says that a package is not installed.
+        # The check of its extra reports a package that is not installed.
         *((name, check()) for name, package, check in _PACKAGES if installed(package)),
         ("pins", _gpio(dev)),
     ]
@@ -95,7 +95,7 @@ def _machine() -> Results:
 
 
 def _extra(parsed: Sequence[Requirement], extra: str, installed: Callable[[str], str]) -> Results:
-    """Yield whether the core or an extra is installed, in the versions that it needs."""
+    """Check that the packages of an extra, or of the core, are installed in the right versions."""
     absent: list[str] = []
     wrong: list[str] = []
     for one in parsed:
@@ -106,7 +106,7 @@ def _extra(parsed: Sequence[Requirement], extra: str, installed: Callable[[str],
         if not (version := installed(one.name)):
             absent.append(one.name)
         elif not one.specifier.contains(version, prereleases=True):
-            wrong.append(f"{one.name} is {version} and not {one.specifier}")
+            wrong.append(f"{one.name} must be {one.specifier}, got {version}")
     wanted = f"'{_PACKAGE}[{extra}]'" if extra else _PACKAGE
     remedy = f"run `pip install --upgrade {wanted}`"
     if wrong:
@@ -159,7 +159,7 @@ def _gpio(dev: Path) -> Results:
         yield "good", "`shapechanger robot check PROFILE` checks the pins of a robot."
     else:
         remedy = "run `sudo usermod -aG gpio $USER` and log in again"
-        yield "bad", f"{chips[0]} may not be opened: {remedy}."
+        yield "bad", f"No permission to open {chips[0]}: {remedy}."
 
 
 _PACKAGES: Final = (

@@ -28,22 +28,20 @@ Body = Annotated[str, tyro.conf.arg(help="Another body of the family: its name, 
 OwnLearner = Annotated[
     str,
     tyro.conf.arg(
-        help="Your class or function that the policy was trained with, as module:name; the file "
-        "alone may not import it."
+        help="Your class or function that the policy was trained with, as module:name. It is "
+        "imported only if you give it here."
     ),
 ]
 Learner = Annotated[
     str,
     tyro.conf.arg(
-        help="Name of the learner's settings, a TOML file of them, or your class or function as "
-        "module:name; by default the settings tuned for the env, or for the target."
+        help="Name of the learner's settings, a TOML file with settings, or your class or function "
+        "as module:name; by default the settings tuned for the env, or for the target."
     ),
 ]
 Settings = Annotated[
     tuple[str, ...],
-    tyro.conf.arg(
-        help="Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."
-    ),
+    tyro.conf.arg(help="Changed settings of the learner, as NAME=VALUE: learning_rate=3e-4."),
 ]
 RepoName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="REPO")]
 Public = Annotated[
@@ -75,7 +73,7 @@ def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
 
 
 def options_of(given: str, flag: str) -> dict[str, Any]:
-    """Parse further arguments of an env."""
+    """Parse further arguments of an env from JSON."""
     if not given:
         return {}
     try:
@@ -83,7 +81,7 @@ def options_of(given: str, flag: str) -> dict[str, Any]:
     except ValueError as error:
         raise StudyError(f"{flag} must be JSON ({error}), got {given!r}.") from None
     if not isinstance(options, dict):
-        raise StudyError(f'{flag} are a JSON object such as {{"robot": "mine"}}, got {given}.')
+        raise StudyError(f'{flag} must be a JSON object such as {{"robot": "mine"}}, got {given}.')
     task = cast("dict[str, Any]", options).get("task")
     allow_own_modules(task if isinstance(task, str) else None)
     return cast("dict[str, Any]", options)
@@ -109,9 +107,9 @@ class TwoEnvs:
     """Options of a command that goes from one env to another."""
 
     source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
-    """Id of the env to come from, in which a policy is learned, such as Ant."""
+    """Id of the source env, in which a policy is learned, such as Ant."""
     target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
-    """Id of the env to go to, such as ExtendedAnt."""
+    """Id of the target env, such as ExtendedAnt."""
     source_body: str = ""
     """Another body of the source's family: its name, or edits as JSON."""
     target_body: str = ""
@@ -119,12 +117,12 @@ class TwoEnvs:
     source_options: str = ""
     """More arguments of the source as JSON, such as '{"actions": "length"}'."""
     target_options: str = ""
-    """The same of the target, such as '{"gap": "real-like"}' for a finger."""
+    """More arguments of the target as JSON, such as '{"gap": "real-like"}' for a finger."""
 
     def refs(self, *, studied: bool = False, lenses: Sequence[str] = ()) -> tuple[EnvRef, EnvRef]:
         """Return source and target with their bodies and options.
 
-        In a study, vehicles are reset after a collision, and the target's camera may have lenses.
+        In a study, vehicles are reset after a collision, and `lenses` disturb the target's camera.
         """
         source = env_ref(self.source, self.source_body)
         target = env_ref(self.target, self.target_body)
@@ -137,7 +135,7 @@ class TwoEnvs:
 
 
 def policy_file(given: Path, env: EnvRef) -> Path:
-    """Return a policy's file: the one given, or the one that ships for an env."""
+    """Return the given policy file, or the shipped policy of an env for "reference"."""
     if given.exists():
         return given
     if str(given) == _REFERENCE:
@@ -156,8 +154,8 @@ def settings_of(given: Sequence[str]) -> dict[str, Any]:
             parsed = {}
         if len(parsed) != 1:
             raise StudyError(
-                f"A setting is written NAME=VALUE, such as learning_rate=3e-4 or "
-                f"net_arch=[64,64], not {text!r}."
+                f"A setting must be NAME=VALUE, such as learning_rate=3e-4 or "
+                f"net_arch=[64,64], got {text!r}."
             )
         if name in settings:
             raise StudyError(f"--set names {name} more than once.")

@@ -23,7 +23,7 @@ class EnvsList:
     """List all envs."""
 
     odrl: bool = False
-    """List the bodies of ODRL one by one, instead of in one row."""
+    """List each env of ODRL in a separate row."""
 
     def run(self) -> None:
         table = Table("id", "body", box=None, pad_edge=False)
@@ -34,7 +34,7 @@ class EnvsList:
             return
         for env_id, summary in summaries().items():
             table.add_row(env_id, summary)
-        table.add_row(OWN_ROBOT, "your MJCF or URDF file: give FILE or FILE@TASK as ENV")
+        table.add_row(OWN_ROBOT, "your MJCF or URDF file; give FILE or FILE@TASK as ENV")
         robots = len({entry.family for entry in ODRL_ENVS.values()})
         targets = len(ODRL_ENVS) - robots
         table.add_row(
@@ -121,7 +121,7 @@ def _layout_table(side: str, layout: Layout) -> Table:
 
 
 def _in_words(value: Any) -> str:
-    """Format a value: rounded numbers, edits as JSON."""
+    """Format a value; numbers are rounded."""
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, tuple):

@@ -33,7 +33,7 @@ from shapechanger.finger.report import (
 )
 from shapechanger.finger.tensions import drive_of
 
-# Largest file of parameters, which have some kilobytes.
+# Size of the largest file of parameters, bytes; a usual file has some kilobytes.
 _MOST_BYTES: Final = 1 << 20
 
 
@@ -44,12 +44,12 @@ class FingerIdentify:
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
     """The log, as `shapechanger finger record` writes it."""
     out: Path | None = None
-    """File for the parameters, such as finger.json, which finger envs take as `parameters`."""
+    """File for the parameters, such as finger.json; finger envs accept it as `parameters`."""
     report: Path | None = None
-    """The page to write; by default next to the log."""
+    """The HTML page to write; by default next to the log."""
     geared: bool = False
-    """Assume geared servos, as in the shipped rig, if the log does not describe the motors. Logs
-    that `record` has written of a rig describe them."""
+    """Assume the geared servos of the shipped rig if the log does not describe its motors. Logs
+    that `record` has written from a rig describe them."""
 
     def run(self) -> None:
         page = self.report or self.log.with_name(f"{self.log.stem}.html")
@@ -112,7 +112,7 @@ class FingerRecord:
         for seed in (self.seed, self.finger_seed):
             check_seed(seed, StudyError)
         if not 0.0 < self.seconds < float("inf"):
-            raise FingerError(f"--seconds is more than 0, got {self.seconds}.")
+            raise FingerError(f"--seconds must be above 0, got {self.seconds}.")
         require_file(self.out)
         of_gap = {"gap": self.gap, "finger_seed": self.finger_seed} if self.gap else {}
         more = {"actions": self.actions, **of_gap, **options_of(self.options, "--options")}
@@ -137,7 +137,7 @@ class FingerExport:
     actions: str = "impedance"
     """Meaning of a control: impedance, tension or length."""
     gap: str = ""
-    """Name of the gap that the finger is drawn from instead, such as real-like."""
+    """Name of a gap to draw the finger from, such as real-like; excludes --parameters."""
     finger_seed: int = 0
     """Seed of the finger drawn from the gap."""
 

@@ -38,7 +38,7 @@ except KeyboardInterrupt:  # pragma: no cover  # Tested in a subprocess.
 
 @dataclass(frozen=True)
 class Group:
-    """Commands with the same first word: a line for the help, and module and class of each."""
+    """Commands with the same first word: the help text, and module and class of each command."""
 
     summary: str
     commands: Mapping[str, str | Group]
@@ -137,10 +137,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # From third-party envs, such as one whose renderer is not installed.
         lines = str(error).strip().splitlines() or [type(error).__name__]
         _stop(f"error: {lines[0]}", _WRONG_USAGE)
-    except KeyboardInterrupt as stop:  # `Interrupted` says how to go on.
+    except KeyboardInterrupt as stop:  # The message of `Interrupted` explains how to resume.
         _stop(str(stop) or "Stopped.", _INTERRUPTED)
     except OSError as error:
-        # With a file name it should have been translated before: a defect.
+        # Other errors, and those with a file name, should have been translated: report a defect.
         if error.errno not in {errno.ENOSPC, errno.EPIPE} or error.filename is not None:
             raise
         # Python flushes stdout again at exit.
@@ -151,7 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def parse(arguments: Sequence[str]) -> Any:
-    """Return the command that a command line names, which its `run` executes."""
+    """Parse a command line into a command, which `run` executes."""
     words, command = find_command(arguments)
     rest, prog = arguments[len(words) :], " ".join(("shapechanger", *words))
     kind: Any = Union
@@ -170,11 +170,11 @@ def parse(arguments: Sequence[str]) -> Any:
 
 @dataclass(frozen=True)
 class _NotLoaded:
-    """Command in the help of its group, which is not imported for that."""
+    """Placeholder for a command in the help of its group, so that its module is not imported."""
 
 
 def find_command(arguments: Sequence[str]) -> tuple[list[str], type | Group]:
-    """Return the words of the command that a command line begins with, and its class or group."""
+    """Return the first words of a command line, which name a command, and its class or group."""
     words: list[str] = []
     found: str | Group = COMMANDS
     for word in arguments:
@@ -193,7 +193,7 @@ def find_command(arguments: Sequence[str]) -> tuple[list[str], type | Group]:
 
 
 def _summary(command: str | Group) -> str:
-    """Return the line of a command in its group's help, from the file of its class."""
+    """Return a command's line for the help of its group, from the source of its class."""
     if isinstance(command, Group):
         return command.summary
     module, _, kind = command.partition(":")
@@ -217,10 +217,10 @@ def options_of(kind: type) -> dict[str, Any]:
 
 
 def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
-    """Raise an error of one sentence for an option that no parser can read.
+    """Raise an error of one sentence for an unknown option, or an option without its value.
 
-    Nor may an option of several values, or a policy, be given twice: the first one would be dropped
-    without a word. For other options the last one counts.
+    An option with several values, or --policy, must not be given twice: its first values would be
+    dropped silently. For other options the last value counts.
     """
     named = options_of(kind)
     flags = [name for name, hint in named.items() if hint is bool]
@@ -237,9 +237,9 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
         if option in named and option not in flags and not equals and value.startswith("--"):
             raise StudyError(f"{given} needs a value after it: see `{said} --help`.")
         if option in seen and get_origin(named.get(option)) is tuple:
-            raise StudyError(f"{given} is given twice: give it once, with all its values after it.")
+            raise StudyError(f"{given} must be given once, with all its values after it.")
         if option in seen and option == "--policy":
-            raise StudyError("--policy is given twice, and one policy drives at a time.")
+            raise StudyError("--policy must be given once.")
         seen.add(option)
 
 

@@ -29,20 +29,21 @@ class Watching:
     """Options of a command that shows episodes."""
 
     out: Path | None = None
-    """A film to write instead of opening a window, such as ant.mp4; play.mp4 without a screen."""
+    """A film to write instead of opening a window, such as ant.mp4; by default play.mp4 if there is
+    no screen."""
     episodes: int = 1
     """Number of episodes."""
     seed: int = 0
     """Seed of the starts, and of random actions."""
     max_steps: int = 1000
-    """Longest episode to show."""
+    """Steps after which a shown episode ends."""
     learner: OwnLearner = ""
 
     def show(self, ref: EnvRef, policy: Path | None, *, trained_in: bool = False) -> None:
         """Show episodes in a window or write them as a film, and print the returns."""
         check_seed(self.seed, StudyError)
         if self.episodes < 1 or self.max_steps < 1:
-            raise StudyError("Playing takes at least one episode of one step.")
+            raise StudyError("--episodes and --max-steps must be at least 1.")
         out = self.out or (None if has_screen() else Path("play.mp4"))
         if out is not None:
             require_film(out)
@@ -91,7 +92,7 @@ class Play(Watching):
 def acting_in(
     env: gym.Env[Any, Any], file: Path, learner: str = "", trained_in: EnvRef | None = None
 ) -> tuple[gym.Env[Any, Any], Act]:
-    """Return an env with the observations that a policy takes, and the policy as a function."""
+    """Return an env with the layouts of a policy, and the function that computes its actions."""
     policy = load_any_policy(file, learner)
     card: PolicyCard = policy.card
     if trained_in is not None and ENV in card.identity:
@@ -127,5 +128,5 @@ def _fitting(env: gym.Env[Any, Any], card: PolicyCard) -> gym.Env[Any, Any]:
     entries = (*body_map.observation, *body_map.action)
     filled = [entry.feature for entry in entries if not isinstance(entry.rule, Copy)]
     if filled:
-        say(f"Without a counterpart in the other body, and so constant: {', '.join(filled)}.")
+        say(f"Constant, because the other body has no counterpart: {', '.join(filled)}.")
     return MappedEnv(env, body_map)

@@ -51,8 +51,8 @@ class _InEnv(_OfPolicy):
     """Options of a command for a policy in an env."""
 
     env: str = ""
-    """Id of another env, in which the policy acts through the body map that matches names; the env
-    that it was trained in if not given."""
+    """Id of another env, in which the policy acts through the body map that matches names; if not
+    given, the env that the policy was trained in."""
     body: Body = ""
 
     def ref(self) -> EnvRef:
@@ -61,7 +61,7 @@ class _InEnv(_OfPolicy):
             return driven(env_ref(self.env, self.body))
         env = load_any_policy(self.file, self.learner).card.env
         if env is None:
-            raise StudyError(f"{self.file} learned from recordings without an env: give --env.")
+            raise StudyError(f"{self.file} was trained on recordings that name no env: give --env.")
         # A policy for many bodies is shown in the family's default body.
         trained_in = single_body(env)
         # The env, or its task, may come from a module of the user.
@@ -91,7 +91,7 @@ class PoliciesShow(_OfPolicy):
         for part, identity in card.identity.items():
             made_of = {"model": identity.model, **identity.files}
             shown = ", ".join(f"{name} {digest}" for name, digest in made_of.items() if digest)
-            lines[f"{part} is of"] = shown
+            lines[f"{part} digest"] = shown
         for name, text in lines.items():
             say(f"{name:12} {text}")
         if card.settings is not None:
@@ -117,7 +117,7 @@ class PoliciesList:
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")] = Path("results")
     """The folder."""
     references: bool = False
-    """List the policies that ship instead, one for each env."""
+    """List the shipped policies instead, one for each env."""
 
     def run(self) -> None:
         if self.references:
@@ -134,8 +134,8 @@ class PoliciesList:
             table.add_row(name, *(lines[each] for each in ("env", "learner", "steps", "seed")))
         if not table.rows:
             raise StudyError(
-                f"There is no policy in {self.folder}: train one, name a folder, or give "
-                "--references for those that ship."
+                f"There is no policy in {self.folder}: train one, name another folder, or give "
+                "--references for the shipped policies."
             )
         print_table(table)
 
@@ -153,14 +153,14 @@ def _print_references() -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class PoliciesEvaluate(_InEnv):
-    """Play a policy for some episodes, and print its measures."""
+    """Run a policy for some episodes, and print its measures."""
 
     episodes: int = 10
-    """Number of episodes; they have the same starts as every evaluation."""
+    """Number of episodes; every evaluation uses the same starts."""
 
     def run(self) -> None:
         if self.episodes < 1:
-            raise StudyError("An evaluation takes at least one episode.")
+            raise StudyError(f"--episodes must be at least 1, got {self.episodes}.")
         ref = self.ref()
         with opened(ref) as env:
             acting, act = acting_in(
@@ -188,8 +188,8 @@ class PoliciesPlay(_InEnv, Watching):
 class PoliciesExport(_InEnv):
     """Export a policy for other programs, which need neither PyTorch nor Shapechanger.
 
-    Exported clones can run on board a robot. --env and --body select the body that a limb policy
-    is exported for; other policies are exported for the body that they were trained on.
+    Exported clones can run on a robot's computer. --env and --body select the body that a limb
+    policy is exported for; other policies are exported for the body that they were trained on.
     """
 
     out: Path
@@ -226,7 +226,7 @@ def _learned_with(card: PolicyCard, net: CloneNetwork) -> tuple[str, float | Non
     """Return the body and the rate of a clone's demonstrations, as far as its card has them."""
     if card.env is None:
         return net.body, net.control_hz
-    # Waypoints are the same in all bodies.
+    # Waypoints have the same meaning in all bodies.
     body, _ = VEHICLE_ENVS.get(card.env.id, ("", ""))
     return body, 1.0 / PERIOD_S if body or card.env.id in WAYPOINT_ENVS else None
 
@@ -236,7 +236,7 @@ class PoliciesConvert:
     """Convert a zip of PPO, SAC or TQC from Stable-Baselines3; loading it can run code from it."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A zip that the model's `save` wrote."""
+    """A zip file that the `save` method of the model has written."""
     env: EnvId
     out: Path
     """The file to write, such as mine.safetensors."""

@@ -62,7 +62,7 @@ _FILM: Final = "film.mp4"
 class SuiteRun(StudyRuns):
     """Run a suite of studies: one study and report per pair, and a joint page.
 
-    Run the same command again to resume, or with more seeds to add to it.
+    Run the same command again to resume the suite; more --seeds add runs to it.
     """
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
@@ -95,7 +95,7 @@ class SuiteRun(StudyRuns):
                 runs = unfinished_runs(plan, folder)
                 study = run_showing_progress(plan, folder, runs, executor=executor, traits=traits)
             except FailedRuns as error:
-                if plan.exclusive:  # The next study would move the robot.
+                if plan.exclusive:  # A robot is the target, and the next study would move it.
                     raise
                 failed.append(f"{name}: {error}")
                 continue
@@ -127,16 +127,16 @@ def _plan(suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
 
 @dataclass(frozen=True)
 class SuiteWatch:
-    """Watch a suite that runs elsewhere: progress and last evaluations of its runs."""
+    """Watch a suite that another process runs: progress and last evaluations of its runs."""
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
     """The suite's folder, such as results/ants."""
     every: float = 5.0
-    """Seconds between updates of a terminal; other outputs get the table once."""
+    """Seconds between updates in a terminal; the table is printed once to a file or pipe."""
 
     def run(self) -> None:
         if self.every <= 0.0:
-            raise StudyError(f"--every is a number of seconds above 0, got {self.every:g}.")
+            raise StudyError(f"--every must be above 0, got {self.every:g}.")
         table, complete = _progress_table(self.folder)
         if not sys.stdout.isatty():
             print_table(table)
@@ -200,11 +200,11 @@ class SuiteList:
 
 
 def _progress_table(out: Path) -> tuple[Table, bool]:
-    """A row for each study in a suite's folder, and whether all are complete."""
+    """Return a table with a row for each study in a folder, and whether all are complete."""
     table = Table("study", "runs", "steps", "at work", box=None)
     complete = True
     for path in sorted(out.glob(f"*/{PLAN_FILE}")):
-        # Methods may be modules of the current folder, as they are for the process that runs them.
+        # Like the process that runs the suite, import methods from modules of the current folder.
         allow_own_modules(*planned_arms(path.parent))
         plan = read_plan(path.parent, f"{path.parent} is kept as it is")
         ended, done, total = 0, 0, 0
@@ -227,7 +227,7 @@ def _progress_table(out: Path) -> tuple[Table, bool]:
 
 
 class _Page:
-    """The page of a suite, written again whenever a study has ended."""
+    """The HTML page of a suite, written again whenever a study has ended."""
 
     def __init__(self, name: str, out: Path | None) -> None:
         self.suite = load_suite(name)

@@ -40,14 +40,14 @@ class Train:
     out: Path | None = None
     """The file to write; results/policies/ENV.safetensors if not given."""
     steps: int | None = None
-    """Env steps; the learner's own number if not given."""
+    """Number of env steps; the learner's default if not given."""
     learner: Learner = ""
     set: Settings = ()
     seed: int = 0
-    """Seed of everything random."""
+    """Seed of all randomness."""
     teacher: Path | None = None
-    """Policy of the same vehicle on distances, such as one of CarRanges: trains a student of it,
-    which sees images alone, instead of learning by trial."""
+    """Policy of the same vehicle that observes distances, such as one of CarRanges. A student that
+    observes images only is trained to imitate it, instead of reinforcement learning."""
     tensorboard: Path | None = None
     """Folder for TensorBoard's logs; none are written if not given."""
 
@@ -57,7 +57,7 @@ class Train:
         env = driven(env_ref(self.env, self.body))
         if self.bodies:
             if self.bodies < 0 or self.body:
-                raise StudyError("--bodies takes a number above 0, and no --body.")
+                raise StudyError("--bodies must be above 0, and excludes --body.")
             draw = BodyDraw(count=self.bodies, seed=self.seed)
             env = env.having({"bodies": msgspec.to_builtins(draw)})
         out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
@@ -69,20 +69,20 @@ class Train:
             with StudyProgress({env.id: steps}) as progress:
                 policy = training(lambda done: progress(env.id, done, False))
         except KeyboardInterrupt:
-            raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
+            raise Interrupted("Stopped; an interrupted training leaves no policy.") from None
         policy.carded(command=command_line()).save(out)
         say(f"wrote {out}")
 
     def _by_learner(self, env: EnvRef) -> tuple[int, _Training]:
-        """Return the number of steps, and the training by a learner, after checking both."""
+        """Check the learner and its budget; return the number of steps and the training."""
         wanted = self.learner or ("limbs" if self.bodies else default_learner(env))
         if self.bodies:
             wanted = in_many_bodies(wanted)
         learner, settings = resolve_learner(wanted, settings_of(self.set))
         if self.bodies and "many bodies" not in settings.takes:
             raise StudyError(
-                f"{learner} learns in one body: give --learner limbs, or rsl-ppo for worlds on a "
-                "GPU, which fit many, with --bodies."
+                f"{learner} learns in one body. With --bodies, give --learner limbs, or rsl-ppo "
+                "for worlds on a GPU."
             )
         steps = settings.steps if self.steps is None else self.steps
         settings.require_budget(steps)
@@ -113,11 +113,11 @@ class Train:
         return whole, training
 
     def _by_teacher(self, env: EnvRef, teacher: Path) -> tuple[int, _Training]:
-        """Return the number of steps, and the training of a student of another policy."""
+        """Return the number of steps, and the training of a student of `teacher`."""
         from shapechanger.vehicles.cloning import STUDENT_STEPS, train_student  # PyTorch.
 
         if self.learner or self.set or self.tensorboard is not None:
-            raise StudyError("A student has no learner: give --teacher without one.")
+            raise StudyError("--teacher excludes --learner, --set and --tensorboard.")
         if not teacher.exists():
             raise StudyError(
                 f"There is no teacher {teacher}: `shapechanger train CarRanges` makes a car's."

@@ -52,34 +52,37 @@ class StudyRuns:
     steps: int | None = None
     """Target steps of a run; the suite's or the learner's number if not given."""
     source_steps: int | None = None
-    """Source steps of a source policy; the suite's or the learner's number if not given: half as
-    many as target steps, and more for a rig. With --source-policy, the steps of arms that train
-    another source policy, such as identified."""
+    """Source steps of a source policy; the suite's or the learner's number if not given. The
+    learner's number is half of the target steps, and more for a rig. With --source-policy, they
+    apply to arms that train another source policy, such as identified."""
     seed: int | None = None
     """Number that the seeds of all runs are drawn from; the suite's number, or 0, if not given."""
     executor: Literal["processes", "ray"] = "processes"
-    """Where runs run: in processes of this machine, or on a Ray cluster."""
+    """Whether runs are executed in processes of this machine or on a Ray cluster."""
     address: str | None = None
     """Address of the Ray cluster: 10.0.0.1:6379 or auto; Ray on this machine if not given."""
     workers: int | None = None
-    """Runs at a time; one for each core if not given, and one where the target is a robot."""
+    """Number of runs at a time; if not given, one for each core, or one if the target is a
+    robot."""
 
     def made_executor(self) -> Executor:
         """Return the executor of the runs."""
         if self.executor == "ray":
             if self.workers is not None:
-                raise StudyError("Ray runs one run on each core of its nodes: leave out --workers.")
+                raise StudyError(
+                    "Ray executes one run on each core of its nodes: leave out --workers."
+                )
             from shapechanger.transfer.ray_executor import RayCluster  # An extra.
 
             return RayCluster(self.address)
         if self.address is not None:
-            raise StudyError("--address names a Ray cluster: give --executor ray, too.")
+            raise StudyError("--address needs --executor ray.")
         return Processes(self.workers)
 
 
 def run_showing_progress(plan: Plan, folder: Path, runs: Iterable[Run], **more: Any) -> Study:
     """Run a study and show its progress; `runs` are the runs that have not ended yet."""
-    # An evaluation counts as one step.
+    # A run without training, which is only evaluated, counts as one step.
     with StudyProgress({run.name: max(1, plan.steps_of(run.kind)) for run in runs}) as progress:
         return run_study(plan, folder, on_progress=progress, command=command_line(), **more)
 
@@ -92,12 +95,12 @@ class Transfer(TwoEnvs, StudyRuns):
     """
 
     quick: bool = False
-    """Two seeds and an eighth of the steps: a check that everything works, not a result."""
+    """Use two seeds and an eighth of the steps, to check that everything works."""
     out: Path | None = None
     """The study's folder; results/SOURCE-to-TARGET if not given."""
     source_policy: Path | None = None
-    """A given source policy, instead of training one for each seed: a file, or `reference` for the
-    one that ships for the source."""
+    """A source policy to use instead of training one for each seed: a file, or `reference` for the
+    shipped policy of the source."""
     target_lens: tuple[str, ...] = ()
     """Disturbances of a vehicle's target camera: night, glare, blur or dirt."""
     measure: str = ""
@@ -106,9 +109,9 @@ class Transfer(TwoEnvs, StudyRuns):
     learner: Learner = ""
     set: Settings = ()
     arms: tuple[str, ...] = ()
-    """Methods to compare; scratch is required. `shapechanger methods` lists them, and module:name
-    is a method that your module registers. The default is scratch, zero-shot and fine-tune;
-    if the target is the same task in another finger, also randomised and identified."""
+    """Methods to compare; scratch is required. `shapechanger methods` lists them; module:name is a
+    method that your module registers. The default is scratch, zero-shot and fine-tune, and if the
+    target is the same task in another finger, also randomised and identified."""
     rule: tuple[str, ...] = ()
     """Rules of the body map for entries without a partner, as NAME=RULE: "foot_*/motor=learn",
     "foot_*/motor=copy ankle_*/motor", "*/contact/*=zero", "ankle_4/angle=hold"."""
@@ -123,8 +126,8 @@ class Transfer(TwoEnvs, StudyRuns):
             raise StudyError(f"--arms names {', '.join(twice)} more than once.")
         if self.map and (self.rule or self.units != "same"):
             raise MapError(
-                "The file of --map defines the whole body map: leave out --rule and --units, or "
-                "--map."
+                "The file of --map defines the whole body map: leave out either --map or both "
+                "--rule and --units."
             )
         allow_own_modules(self.learner, *self.arms)
         task = TransferTask(*self.refs(studied=True, lenses=self.target_lens))
@@ -137,7 +140,7 @@ class Transfer(TwoEnvs, StudyRuns):
             settings = settings.for_budget(shortest)
             steps = shortest if steps is None else steps
             seeds = _QUICK_SEEDS if self.seeds is None else seeds
-        # Budgets are refused before PyTorch is imported and envs are opened, which takes seconds.
+        # Check budgets first, because importing PyTorch and opening envs takes seconds.
         study_budgets(settings, steps, self.source_steps, is_given=bool(self.source_policy))
 
         # The report comes last; check its requirements before the work.
@@ -199,7 +202,7 @@ class Methods:
 def _split_rule(text: str) -> tuple[str, str]:
     name, equals, rule = text.partition("=")
     if not (name and equals and rule):
-        raise MapError(f"A rule is written NAME=RULE, such as 'foot_*/motor=learn', not {text!r}.")
+        raise MapError(f"A rule must be NAME=RULE, such as 'foot_*/motor=learn', got {text!r}.")
     return name, rule
 
 

@@ -232,7 +232,7 @@ def test_a_policy_is_corrected(tmp_path: Path, demos: Cli) -> None:
     ("arguments", "words"),
     [
         (["Ant"], "has no expert"),
-        (["Car", "--minutes", "0"], "--minutes is more than 0"),
+        (["Car", "--minutes", "0"], "--minutes must be above 0"),
         (["Car", "--driver", "expret"], "no driver 'expret'"),
         (["Car", "--corrected-by", "expert"], "Only a policy can be corrected"),
         (["Car", "--corrected-by", "me"], "corrected by expert"),

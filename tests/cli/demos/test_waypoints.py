@@ -200,9 +200,9 @@ def test_several_bodies_and_no_pictures_are_refused(tmp_path: Path) -> None:
 def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     """Options of waypoints need `--waypoints`, and their kind of policy is given."""
     data, out = tmp_path / "drive", tmp_path / "policy.safetensors"
-    with pytest.raises(DemosError, match="belong to --waypoints"):
+    with pytest.raises(DemosError, match="need --waypoints"):
         DemosTrain(data, out, camera=(0.0, 48.8)).run()
-    with pytest.raises(DemosError, match="leave out --head, --inputs"):
+    with pytest.raises(DemosError, match="leave out --head and --inputs"):
         DemosTrain(data, out, waypoints=True, inputs="state").run()
     with pytest.raises(WorldError, match="from 0 to 180, got 95 and 48"):
         DemosTrain(data, out, waypoints=True, camera=(95.0, 48.0)).run()

@@ -37,7 +37,7 @@ def test_a_finger_is_recorded(tmp_path: Path, finger: Cli) -> None:
 def test_invalid_recordings_are_refused(tmp_path: Path, finger: Cli) -> None:
     out = ("--out", tmp_path / "log.npz")
     assert "No argument of Ant matches 'actions'" in finger.refused("record", "Ant", *out)
-    assert "--seconds is more than 0" in finger.refused("record", "Finger", *out, "--seconds", "0")
+    assert "--seconds must be above 0" in finger.refused("record", "Finger", *out, "--seconds", "0")
     assert "omit `goal`" in finger.refused("record", "Finger", *out, "--options", '{"goal": true}')
     assert "real-like" in finger.refused("record", "Finger", *out, "--gap", "real-lik")
 

@@ -69,14 +69,14 @@ def test_fetching_copies_exactly_and_then_only_what_is_new(
     first, data = record(there), tmp_path / "here"
     fetch = ["robot", "fetch", "car", "--out", str(data)]
     main(fetch)
-    assert "40 steps kept of 40, 41 lines came" in capsys.readouterr().out
+    assert "40 steps kept of 40, 41 lines downloaded" in capsys.readouterr().out
     assert snapshot(data / first.name) == snapshot(first)
     edit(first, Drop(0, 9, "bad"))
     second = record(there, 3)
     main(fetch)
     output = capsys.readouterr().out
-    assert "30 steps kept of 40, 1 lines came" in output
-    assert "3 steps kept of 3, 4 lines came" in output
+    assert "30 steps kept of 40, 1 lines downloaded" in output
+    assert "3 steps kept of 3, 4 lines downloaded" in output
     main([*fetch, "--episodes", second.name])
     assert capsys.readouterr().out == f"{second.name}: 3 steps kept of 3, nothing new\n"
     assert [path.name for path in episodes_of(data)] == [first.name, second.name]

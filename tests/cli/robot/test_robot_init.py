@@ -142,7 +142,7 @@ def test_install_reports_each_change(pi: FakePi, car: Profile, said: Said) -> No
 
 def test_a_dry_run_needs_the_unit_only(pi: FakePi, said: Said) -> None:
     """A dry run writes nothing, so the unit of `init` has to be there."""
-    with pytest.raises(RobotError, match="it is written without --dry-run"):
+    with pytest.raises(RobotError, match="without --dry-run, this command writes it"):
         said(dry_run=True)
     said()
     pi.ran.clear()

@@ -36,8 +36,8 @@ class DemosRecord(OneEnv):
     driver: str = EXPERT
     """"expert", or the file of a policy."""
     corrected_by: str = ""
-    """"expert" to let it take over where the policy would fail. Training then uses the expert's
-    steps only."""
+    """"expert" to let the expert take over when the policy would fail. Training then uses the
+    expert's steps only."""
     episode_s: float = 50.0
     """Longest episode, s; a collision ends it earlier."""
     lenses: tuple[str, ...] = ()
@@ -45,13 +45,13 @@ class DemosRecord(OneEnv):
     put_back: bool = False
     """Put a vehicle back on its lane after a collision, instead of ending the episode."""
     seed: int = 0
-    """Seed of the first episode; each later one has the next whole number."""
+    """Seed of the first episode; it increases by one for each further episode."""
 
     def run(self) -> None:
         check_seed(self.seed, StudyError)
         for name, value in (("minutes", self.minutes), ("episode-s", self.episode_s)):
             if not 0.0 < value < float("inf"):
-                raise DemosError(f"--{name} is more than 0, got {value}.")
+                raise DemosError(f"--{name} must be above 0, got {value}.")
         ref = self._ref()
         made = ref.make(max_episode_steps=-1)
         try:
@@ -93,8 +93,8 @@ class DemosRecord(OneEnv):
         more |= {"put_back": True} if self.put_back else {}
         if more and ref.id not in VEHICLE_ENVS:
             raise DemosError(
-                f"--put-back and --lenses are for vehicles, and {ref.id} is not one of them: "
-                f"{', '.join(VEHICLE_ENVS)}."
+                f"--put-back and --lenses need a vehicle's env, got {ref.id}; the envs of vehicles "
+                f"are {', '.join(VEHICLE_ENVS)}."
             )
         return ref.having({**more, **options_of(self.options, "--options")})
 
@@ -125,10 +125,12 @@ class DemosReplay:
     def run(self) -> None:
         asked = [bool(self.film), bool(self.env), bool(self.robot)]
         if sum(asked) != 1:
-            raise DemosError("An episode is played with one of --film, --env and --robot.")
+            raise DemosError("Give exactly one of --film, --env and --robot.")
         episode = episode_at(self.episode)
         if not episode.kept:
-            raise DemosError(f"No step of {episode.path} counts: `shapechanger demos good` it.")
+            raise DemosError(
+                f"All steps of {episode.path} are dropped: `shapechanger demos good` restores them."
+            )
 
         if self.film is not None:
             say(write_episode_film(episode, self.film))

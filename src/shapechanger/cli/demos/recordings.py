@@ -130,7 +130,7 @@ def _read_all(data: Path) -> dict[Path, Episode | DemosError]:
 
 
 def _say_broken(found: dict[Path, Episode | DemosError]) -> list[str]:
-    """Print why episodes cannot be read, and return it."""
+    """Print and return why episodes cannot be read."""
     broken = [str(one) for one in found.values() if isinstance(one, DemosError)]
     for sentence in broken:
         say(sentence)
@@ -150,9 +150,9 @@ class _Steps:
 
     episode: _Episode
     first: _From = None
-    """The first step; the episode's if not given."""
+    """The first step of the range; the episode's first step if not given."""
     last: _To = None
-    """The last step; the episode's if not given."""
+    """The last step of the range; the episode's last step if not given."""
 
     def _range(self) -> tuple[Episode, int, int]:
         """Return the episode, and the first and the last step."""
@@ -229,19 +229,19 @@ class DemosMerge:
     ]
     """Folders of the recordings, or of single episodes."""
     out: Path
-    """Folder of the recording that they come into."""
+    """Folder of the recording to copy them to."""
 
     def run(self) -> None:
         copied = merge(self.data, self.out)
         for source, target in copied:
             if source.name != target.name:
-                say(f"{source} became {target.name}: its name was taken")
+                say(f"{source} became {target.name}: another episode has its name")
         say(f"copied {counted(len(copied), 'episode')} to {self.out}")
         headers = [read_episode(path).header for path in episodes_of(self.out)]
         layouts = {(header.action_layout, header.state_layout) for header in headers}
         if len(layouts) > 1:
             say(
-                f"they have {len(layouts)} different layouts, and a policy learns from one: "
+                f"the episodes have {len(layouts)} different layouts, and a policy learns from one: "
                 "`shapechanger demos list` lists their robots"
             )
 
@@ -283,9 +283,9 @@ class DemosImport:
     format: str = "auto"
     """Format of the folder: tub, minari, lerobot, csv or an installed one; auto detects it."""
     camera: str = ""
-    """Which camera to take from a LeRobot dataset or a tub that has several, such as front."""
+    """Camera to import from a LeRobot dataset or a tub with several cameras, such as front."""
     hz: float | None = None
-    """Steps per second, for formats that do not state them; otherwise measured from their times."""
+    """Steps per second, if the format does not state them; computed from its times by default."""
     strict: bool = False
     """Refuse a source that is incomplete or contradicts itself, instead of importing the rest."""
 
@@ -315,12 +315,12 @@ class DemosExport:
 
     data: _Data
     out: Path
-    """The folder to make; it must not exist yet. For minari its name ends in a version, such as
-    drive-v0."""
+    """The folder to make; it must not exist yet. For minari, its name must end with a version, such
+    as drive-v0."""
     to: str
     """Format to write: minari, lerobot, csv, mcap, tub or an installed one."""
     dropped: bool = False
-    """Write dropped steps too, marked as such; only minari, csv and mcap can."""
+    """Write dropped steps too, marked as dropped; minari, csv and mcap only."""
     task: str = ""
     """Description of the task, for policies that follow language; lerobot only."""
     images: bool = False
@@ -389,7 +389,7 @@ class DemosPull:
 
     def run(self) -> None:
         if not 0.0 < self.max_gib < float("inf"):
-            raise HubError(f"--max-gib is more than 0, got {self.max_gib}.")
+            raise HubError(f"--max-gib must be above 0, got {self.max_gib}.")
         with (
             new_folder(self.out) as folder,
             tempfile.TemporaryDirectory(dir=folder) as place,

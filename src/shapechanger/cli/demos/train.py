@@ -34,11 +34,11 @@ class _Waypoints:
     """Options for converting a recording of steering to waypoints."""
 
     camera: tuple[float, float] | None = None
-    """Pitch and vertical field of view of the camera, degrees, for waypoints; from the
+    """Pitch and vertical field of view of the camera, degrees, for waypoints; read from the
     recording if not given."""
     response: tuple[float, float] | None = None
-    """How far the vehicle turns at full steering, rad for each metre and for each second, for
-    waypoints; fitted to its recorded motion if not given."""
+    """Turn of the vehicle at full steering for waypoints, rad/m and rad/s; fitted to the recorded
+    motion if not given."""
 
     def view(self) -> CanonicalView:
         """Return how images are warped to the virtual camera."""
@@ -66,19 +66,19 @@ class DemosTrain(_Waypoints):
     inputs: Literal["auto", "picture", "state", "both"] = "auto"
     """Input; by default frames if there are any, else the state."""
     split: Literal["time", "episode"] = "time"
-    """Held-out data: the last stretch of time, or the last complete episodes."""
+    """Held-out data: the last steps in time, or the last complete episodes."""
     held_out: float = 0.2
-    """Share of the steps to evaluate the policy on, not learned from; 0 to learn from all."""
+    """Share of the steps that the policy is evaluated on and does not learn from; 0 for none."""
     waypoints: bool = False
-    """Learn waypoints instead of steering and throttle, which any vehicle can follow:
+    """Learn waypoints instead of steering and throttle; any vehicle can follow waypoints:
     shapechanger play TankWaypoint --policy ..."""
     seed: int = 0
     """Seed of all randomness."""
     sac: Path | None = None
-    """Also write it as a file that `stable_baselines3.SAC.load` reads, to continue with
+    """Also write the policy as a file that `stable_baselines3.SAC.load` reads, to continue with
     reinforcement learning."""
     ppo: Path | None = None
-    """Also write it as a file that `stable_baselines3.PPO.load` reads."""
+    """Also write the policy as a file that `stable_baselines3.PPO.load` reads."""
 
     def run(self) -> None:
         self._require_files()
@@ -89,11 +89,11 @@ class DemosTrain(_Waypoints):
         if self.waypoints:
             if self.head == "class" or self.inputs in {"state", "both"}:
                 raise DemosError(
-                    "Waypoint policies map images to numbers: leave out --head, --inputs."
+                    "Waypoint policies map images to numbers: leave out --head and --inputs."
                 )
             view = self.view()
         elif self.camera is not None or self.response is not None:
-            raise DemosError("--camera and --response belong to --waypoints: give it, too.")
+            raise DemosError("--camera and --response need --waypoints.")
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
         if view is not None:
             settings = cast("CloningSettings", LEARNERS["waypoint"]).clone
@@ -114,7 +114,7 @@ class DemosTrain(_Waypoints):
             with StudyProgress(dict.fromkeys(names, settings.steps(n))) as progress:
 
                 def on_check(check: MemberCheck) -> None:
-                    if check.member:  # The one before has ended.
+                    if check.member:  # The previous network has ended.
                         progress(names[check.member - 1], check.step, True)
                     progress(names[check.member], check.step, False)
 
@@ -127,7 +127,7 @@ class DemosTrain(_Waypoints):
                     on_check=on_check,
                 )
         except KeyboardInterrupt:
-            raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
+            raise Interrupted("Stopped; an interrupted training leaves no policy.") from None
         say(training.mirror_note)
         body = "" if view is not None else data.body
         net = replace(policy.net, body=body, control_hz=data.control_hz)
@@ -140,10 +140,12 @@ class DemosTrain(_Waypoints):
             **origin,
         }
         policy = policy.carded(clone=net, command=command_line(), data=origin)
-        note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
+        note = (
+            f"It is evaluated on the last {len(data) - n} of {len(data)} steps, unseen in training."
+        )
         if not evaluated.any():
             evaluated = learned
-            note = "These are the steps that it learned from, so expect less on others."
+            note = "It is evaluated on the steps that it learned from: expect less on others."
         shown = data.part(evaluated)
         evaluation = evaluate(policy, shown)
         policy.save(self.out)
@@ -209,7 +211,7 @@ class DemosEvaluate(_Waypoints):
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """A recording, one episode of it, or anything that `demos import` reads."""
     report: Path | None = None
-    """A page to write, with the worst frames; the numbers are written next to it as JSON."""
+    """An HTML page to write, with the worst frames; its numbers are written next to it as JSON."""
 
     def run(self) -> None:
         policy = load_clone(self.policy)
@@ -221,7 +223,7 @@ class DemosEvaluate(_Waypoints):
         if view is not None and view.rectifiers:
             data, _ = self.converted(data, view)
         evaluation = evaluate(policy, data)
-        note = f"These are the {len(data)} steps of {self.data}."
+        note = f"The policy is evaluated on the {len(data)} steps of {self.data}."
         learned = policy.card.steps
         if policy.card.data.get("digest") == shrinking.digest(data.actions):
             note = f"The policy learned from the first {learned} of these {len(data)} steps."

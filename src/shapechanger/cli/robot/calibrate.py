@@ -44,18 +44,18 @@ class RobotCalibrate:
     """Calibrate servo ends and centres, motor directions and wheel circumferences."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
-    """The robot's profile; the results are written into it, and its comments stay."""
+    """The robot's profile; the results are written into it, and its comments are kept."""
     twin: bool = False
-    """Practise on the twin: no hardware moves, but the results are written all the same."""
+    """Practise on the twin: no hardware moves, but the results are written to the profile."""
     cap: float = 0.4
-    """Largest value that a motor or an ESC is jogged with, 0 to 1; for an ESC, a prompt offers to
-    exceed it."""
+    """Largest value at which a motor or an ESC is jogged, 0 to 1; for an ESC, a prompt offers
+    larger values."""
     wheels_up: bool = False
-    """Without --twin: the wheels are off the ground, so do not ask."""
+    """Without --twin: confirm that the wheels are off the ground, instead of being asked."""
 
     def run(self) -> None:
         if not 0.0 < self.cap <= 1.0:
-            raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
+            raise RobotError(f"--cap must be above 0 and at most 1, got {self.cap}.")
         path = own_profile(self.profile)
         profile = load_profile(path)
         if not (self.twin or self.wheels_up):
@@ -65,8 +65,8 @@ class RobotCalibrate:
             try:
                 calibration.run()
             except ShapechangerError:
-                # Keep the results so far if the last wire was loose. The date is
-                # left out: it is not calibrated.
+                # Keep the results so far, for example if the last wire was loose. The date is left
+                # out, because the robot is not fully calibrated.
                 if calibration.found:
                     say("\nCalibration was interrupted. Results so far:")
                     change_profile(path, calibration.found)
@@ -78,10 +78,10 @@ class RobotCalibrate:
         change_profile(path, calibration.found)
 
 
-# Change of a value at each key press; the second is for finding the duty at which a motor starts.
+# Change of a value at each key press, and in the search for the duty at which a motor starts.
 _STEP: Final = 0.02
 _START_STEP: Final = 0.05
-# Tolerance of the requested value, and time to wait for an output that is held back.
+# Largest difference between a requested and an applied value, and time to wait for it.
 _THERE: Final = 0.07
 _SETTLES_S: Final = 4.0
 _STOP_LOOKS: Final = 50  # Observations within which an emergency stop must be visible.
@@ -97,7 +97,7 @@ class Calibration:
 
     profile: Profile
     keys: Terminal
-    cap: float  # Limits motors, and ESCs unless the person chooses to exceed it.
+    cap: float  # Largest value for motors and ESCs; the person may choose to exceed it for ESCs.
     twin: bool
     found: dict[str, Any] = field(default_factory=dict[str, Any])
 
@@ -130,7 +130,7 @@ class Calibration:
         with self._served(
             {f"output.{output.name}.{key}": us for key, us in widest.items()}
         ) as robot:
-            # Servo ends are searched for; an ESC's end is full speed.
+            # The cap limits an ESC, whose end is full speed; a servo's ends must be reachable.
             cap = self.cap if output.driver == "esc" else 1.0
             for name in names:
                 say(f"  … {name}")
@@ -220,7 +220,7 @@ class Calibration:
                             asked = True
                         wanted = min(max(wanted, -cap), cap)
                         values[place] = min(max(wanted, actions[place].low), actions[place].high)
-                # It may still be moving: a slew, or a controller that is not armed yet.
+                # The output may still be moving: its slew is limited, or its ESC is not armed yet.
                 elif (seen.applied_seq or 0) >= accepted and seen.action_applied == before:
                     is_there = abs(before[place] - values[place]) < _THERE
                     if is_there or time.monotonic() > accepted_s + _SETTLES_S:
@@ -242,7 +242,7 @@ class Calibration:
 
     @contextmanager
     def _served(self, settings: dict[str, Any]) -> Generator[RobotClient]:
-        """Serve the robot with other settings, armed for a person."""
+        """Serve the robot with changed `settings`, and arm it for a person."""
         with tempfile.TemporaryDirectory(prefix="shapechanger-calibrate-") as folder:
             path = Path(folder, "profile.toml")
             path.write_bytes(self.profile.path.read_bytes())

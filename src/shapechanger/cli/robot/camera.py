@@ -1,4 +1,4 @@
-"""`shapechanger robot camera`: measure pitch and field of view of a robot's camera, and draw it."""
+"""`shapechanger robot camera`: measure and draw pitch and field of view of a robot's camera."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from shapechanger.vehicles.cameras.rectify import (
     pitch_of_horizon,
 )
 
-# Range that a profile accepts.
+# Range of the vertical field of view that a profile accepts.
 _LEAST_FOVY_DEG: Final = 10.0
 _MOST_FOVY_DEG: Final = 170.0
 _MOST_BYTES: Final = 2**25
@@ -44,16 +44,18 @@ class RobotCamera:
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
     picture: Path | None = None
-    """JPEG of the whole field of view; taken by the robot's camera if not given."""
+    """JPEG file of the whole field of view; if not given, the robot's camera takes an image."""
     board: str = ""
-    """Inner corners of a checkerboard that stands upright before the robot, such as 9x6."""
+    """Numbers of inner corners of a checkerboard that stands upright before the robot, such as
+    9x6."""
     horizon: float | None = None
     """Row of the horizon in the image, pixels from the top, for example of a distant mark at the
     height of the lens."""
     fovy: float | None = None
     """Vertical field of view, degrees, from the data sheet."""
     out: Path = Path("camera.jpg")
-    """The drawing: the image with the horizon and the view of waypoint policies, and that view."""
+    """The drawing to write: the image with the horizon and the outline of the virtual camera's
+    view, and next to it that view, which waypoint policies observe."""
 
     def run(self) -> None:
         import simplejpeg
@@ -62,7 +64,7 @@ class RobotCamera:
             raise RobotError("Give --board or --horizon, not both.")
         if self.fovy is not None and not _LEAST_FOVY_DEG <= self.fovy <= _MOST_FOVY_DEG:
             raise RobotError(
-                f"--fovy is in degrees, {_LEAST_FOVY_DEG:g} to {_MOST_FOVY_DEG:g}, got "
+                f"--fovy must be {_LEAST_FOVY_DEG:g} to {_MOST_FOVY_DEG:g} degrees, got "
                 f"{self.fovy:g}."
             )
         corners = None
@@ -70,7 +72,7 @@ class RobotCamera:
             sides = re.fullmatch(r"(\d+)x(\d+)", self.board)
             if not sides:
                 raise RobotError(
-                    "--board is the number of inner corners along both sides, such as 9x6, got "
+                    "--board must be the inner corners along both sides, such as 9x6, got "
                     f"{self.board!r}."
                 )
             corners = int(sides[1]), int(sides[2])

@@ -33,7 +33,7 @@ _PORT: Final = 5000
 class RobotCheck:
     """Check a robot's computer and wires, and then, with its wheels off the ground, that it stops.
 
-    It exits with 1 if anything is bad.
+    The exit code is 1 if any finding is bad.
     """
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
@@ -51,25 +51,25 @@ class RobotCheck:
     port: int = _PORT
     """Port at which the robot will be served."""
     credentials: Path | None = None
-    """Folder of its key and certificate, if not the one that `init` made."""
+    """Folder of the robot's key and certificate; by default the one that `init` made."""
     motors_off: bool = False
-    """The motors' supply is off, so test the resistors that keep their drivers off, too."""
+    """Confirm that the motors' supply is off, to also test the resistors that keep their drivers
+    off."""
     wheels_up: bool = False
-    """The wheels are off the ground, so do not ask."""
+    """Confirm that the wheels are off the ground, instead of being asked."""
     jumper: tuple[int, int] | None = None
-    """Two free BCM pins joined by a wire, an output and an input, to try first."""
+    """Two free BCM pins that a wire joins, to test first: an output and an input."""
     cap: float = _CAP
-    """Largest throttle of the checks that drive, 0 to 1; faults are tried at full throttle."""
+    """Largest throttle of the checks that drive, 0 to 1; faults are caused at full throttle."""
     yes: bool = False
-    """With --leds: no motor is connected, and no questions are to be asked."""
+    """With --leds: confirm that no motor is connected, and ask no questions."""
     probe: int | None = None
-    """With --leds: a free BCM pin, joined by a wire to the pin of the motor that drives forward,
-    which measures when it stops."""
+    """With --leds: a free BCM pin that a wire joins to the pin of the motor that drives forward, to
+    measure when that motor stops."""
     trials: int = 1
-    """With --faults: trials of each fault."""
+    """With --faults: number of trials of each fault."""
     one_shot: bool = True
-    """With --faults: whether the one-shot of the enable line is fitted, where the profile has
-    one."""
+    """With --faults: simulate the one-shot of the enable line, if the profile has one."""
     report: Path | None = None
     """File of the report; leds-report.txt with --leds, and none otherwise."""
 
@@ -77,7 +77,7 @@ class RobotCheck:
         profile = load_profile(find_profile(self.profile))
         level = self._level()
         on_twin = self.twin or self.faults
-        # Makes the output self-contained.
+        # Identify the version and the machine, for a person who reads only the output.
         say(
             f"shapechanger {version('shapechanger')}, {profile.name} ({profile.body}), "
             f"{'twin' if on_twin else 'hardware'}, Python {platform.python_version()}, "
@@ -120,7 +120,7 @@ class RobotCheck:
             sys.exit(1)
 
     def _level(self) -> CheckLevel:
-        """Return the level; refuse options without an effect, and invalid numbers."""
+        """Return the level of the check; refuse options without an effect, and invalid numbers."""
         options = {"wiring": self.wiring, "leds": self.leds, "faults": self.faults}
         asked = [level for level, chosen in options.items() if chosen]
         if len(asked) > 1:
@@ -143,9 +143,9 @@ class RobotCheck:
                 raise RobotError(f"{option} {needs}.")
         require_port(self.port)
         if not 0.0 < self.cap <= 1.0:
-            raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
+            raise RobotError(f"--cap must be above 0 and at most 1, got {self.cap}.")
         if self.trials < 1:
-            raise RobotError(f"At least one trial is needed, got {self.trials}.")
+            raise RobotError(f"--trials must be at least 1, got {self.trials}.")
         return level
 
     def _require_consent(self, profile: Profile, *, asks: bool) -> None:

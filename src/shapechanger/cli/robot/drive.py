@@ -38,7 +38,7 @@ class RobotDrive:
 
     robot: RobotName
     cap: float = 0.5
-    """Largest steering and throttle to ask for with the keys, 0 to 1; + and - change it."""
+    """Largest steering and throttle that the keys command, 0 to 1; + and - change it."""
     terminal: bool = False
     """Drive with the keys of this terminal, even where a browser could show the console."""
     policy: Path | None = None
@@ -48,7 +48,7 @@ class RobotDrive:
 
     def run(self) -> None:
         if not 0.0 < self.cap <= 1.0:
-            raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
+            raise LinkError(f"--cap must be above 0 and at most 1, got {self.cap}.")
         known = recall(self.robot)
         pilot = None
         if self.policy is not None:
@@ -124,17 +124,20 @@ _HELP: Final = (
     "Q quits"
 )
 _CAP_STEP: Final = 0.1
-# s. A program waiting in `reset` takes a free robot within this time.
+# Time within which a program that waits in `reset` takes control of a free robot, s.
 _TAKEN_WITHIN_S: Final = 2.0
-# Consecutive observations in which a key has no effect and the robot gives no reason.
+# Number of consecutive observations without an effect of a key after which a hint is shown.
 _UNMOVED_LOOKS: Final = 10
-# Keys that may move the robot, and act once while they are held.
+# Keys that act only once while they are held, because they may make the robot move.
 _ONCE: Final = frozenset({"e", "p"})
 _BY_KEYS: Final = frozenset({"steering", "throttle"})
 
 
 class Driving:
-    """Terminal session of a person driving a robot, with a `pilot` or any waiting program."""
+    """Terminal session of a person who drives a robot; P gives control to a waiting program.
+
+    The program is usually `pilot`, the policy of this command.
+    """
 
     def __init__(
         self, robot: RobotClient, terminal: Terminal, cap: float, pilot: PolicyDriver | None = None
@@ -200,7 +203,7 @@ class Driving:
         if key in _ONCE and key == before and now_s - before_s < FIRST_HOLD_S:
             return  # The terminal repeats a held key.
         if key in DIRECTIONS:
-            # A driving key takes the robot from a policy immediately.
+            # A driving key takes control from a program at once.
             if not seen.mine and seen.holder_role == "program":
                 self._robot.take()
             self._keys.press(key, now_s)
@@ -253,7 +256,7 @@ class Driving:
         return "no program waits: start one, and press P while its reset waits"
 
     def _unanswered(self, values: list[float], seen: Observation) -> str:
-        """Return a hint for a key without effect, such as a value below a threshold."""
+        """Return a hint if a key has no effect, for example with a value below a threshold."""
         quiet = seen.mine and seen.armed and not seen.stop_reason
         for name, asked, does in zip(self._actions.names, values, seen.action_applied, strict=True):
             if name in _BY_KEYS:

@@ -27,7 +27,7 @@ _KEY_VARIABLE = "SHAPECHANGER_KEY"
 RobotName = Annotated[
     str,
     tyro.conf.Positional,
-    tyro.conf.arg(metavar="ROBOT", help="Name of a robot that is known here, see `remember`."),
+    tyro.conf.arg(metavar="ROBOT", help="Name of a robot that `remember` has stored."),
 ]
 _LocalName = Annotated[
     str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME", help="Local name of the robot.")
@@ -43,7 +43,7 @@ class RobotFind:
 
     def run(self) -> None:
         if not 0.0 < self.seconds <= 60.0:
-            raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
+            raise LinkError(f"--seconds must be above 0 and at most 60, got {self.seconds}.")
         known: dict[str, str] = {}
         for name in known_names():
             try:
@@ -53,13 +53,13 @@ class RobotFind:
         found = find(self.seconds)
         if not found:
             say(
-                "No robot answers. A network may block multicast DNS; connecting by address works "
-                "all the same."
+                "No robot answers. A network may block multicast DNS; connecting by address "
+                "still works."
             )
             return
         table = Table("robot", "body", "address", "known as", "", box=None, pad_edge=False)
         for robot in found:
-            other = "" if robot.version == str(VERSION) else f"speaks version {robot.version}"
+            other = "" if robot.version == str(VERSION) else f"link version {robot.version}"
             name = known.get(robot.fingerprint, "")
             table.add_row(robot.name, robot.body, str(robot.address), name, other)
         print_table(table)
@@ -73,10 +73,10 @@ class RobotRemember:
     address: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")]
     """Address, as HOST or HOST:PORT."""
     fingerprint: str
-    """SHA-256 of its certificate, as the robot shows it; "insecure" for no TLS."""
+    """SHA-256 of the robot's certificate, as `robot key` shows it; "insecure" for no TLS."""
 
     def run(self) -> None:
-        """Ask for the key, which does not belong on a command line, and store everything."""
+        """Ask for the key, which would be visible on a command line, and store everything."""
         key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
         path = remember(KnownRobot(self.name, self.address, key.strip(), self.fingerprint))
         say(f"wrote {path}")
@@ -104,7 +104,7 @@ def _asked_key(name: str) -> str:
     return key
 
 
-# s. A guard stops within a tick and reports it in the next observation.
+# Time limit for the report of a stop, s. A guard stops within a tick and then reports it.
 _CONFIRMED_WITHIN_S: Final = 2.0
 
 
@@ -114,7 +114,7 @@ class RobotStop:
 
     robot: RobotName
     reason: str = "a person typed `robot stop`"
-    """Why, for people to read."""
+    """Reason, which other clients show to people."""
 
     def run(self) -> None:
         known = recall(self.robot)
@@ -164,9 +164,9 @@ class RobotFetch:
                     failed += 1
                     say(f"{episode.id}: {error}", stderr=True)
                     continue
-                news = f"{came} lines came" if came else "nothing new"
+                news = f"{came} lines downloaded" if came else "nothing new"
                 if own:
-                    news += f", and {counted(own, 'edit')} made here stay"
+                    news += f", {counted(own, 'edit')} made here kept"
                 say(f"{episode.id}: {episode.kept} steps kept of {episode.steps}, {news}")
                 if read_header(self.out / episode.id)[1] is None:
                     say(f"  it is incomplete: shapechanger demos repair {self.out / episode.id}")

@@ -48,13 +48,13 @@ class RobotServe(Service):
     """With --twin, for a finger: name of the gap that it is drawn from, such as real-like; the
     nominal finger if not given."""
     finger_seed: int | None = None
-    """With --gap: seed of the finger drawn from it, as finger_seed of Finger-v1."""
+    """With --gap: seed of the finger drawn from the gap, like finger_seed of Finger-v1."""
 
     def run(self) -> None:
         """Become the robot's supervisor; return only on an error."""
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
-        # Undone only after an error: after exec, the supervisor keeps all resources.
+        # `undo` runs only after an error: after `exec`, the supervisor keeps all resources.
         with contextlib.ExitStack() as undo:
             board = None
             if self.twin:
@@ -74,7 +74,7 @@ class RobotServe(Service):
                     if known := self.make_known(profile.name, plan, port):
                         say(known)
                 sys.stdout.flush()
-            # Replaces this process, which has loaded much that a supervisor does not need.
+            # `exec` frees the modules that this process has loaded and a supervisor does not need.
             command = [*command_of("supervise", plan), "--plan-fd", str(plan_fd(plan))]
             os.execv(plan.python, command)
 
@@ -95,9 +95,9 @@ class RobotServe(Service):
         for seed in (self.seed, self.finger_seed or 0):
             check_seed(seed, RobotError)
         if self.finger_seed is not None and not self.gap:
-            raise RobotError("--finger-seed selects a finger of a --gap: give --gap, too.")
+            raise RobotError("--finger-seed needs --gap.")
         if self.gap and self.world:
-            raise RobotError("A finger of a --gap has no --world: give only one of them.")
+            raise RobotError("Give --gap or --world, not both.")
         require_port(self.port)
 
 
@@ -106,12 +106,12 @@ def place_of(
 ) -> Place:
     """Return the world of a twin: a plain room, a kind of course, or a finger drawn from a gap.
 
-    `world` is "room" for the plain room, or "" for the robot's default. The room also replaces a
-    default that is missing or needs MuJoCo where that is not installed.
+    `world` is "room" for the plain room, or "" for the robot's default. If the robot has no
+    default, or MuJoCo is not installed, "" also selects the room.
     """
     if world == _ROOM or not (world or gap or find_spec("mujoco")):
         if lenses:
-            raise RobotError("The plain room has a plain camera: choose a --world for a --lens.")
+            raise RobotError("--lens has no effect in the plain room: choose another --world.")
         return Place()
     if gap and not find_spec("mujoco"):
         raise MissingExtra("mujoco", "sim")

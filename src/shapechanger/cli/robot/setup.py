@@ -127,8 +127,8 @@ class RobotInit:
         # Lets clients on this machine drive the robot, especially a twin.
         remember(robot_at("127.0.0.1", name, credentials))
         unit, is_new = write_unit(name, out, self.credentials)
-        # Last, because an existing profile is refused: after a failure, such as a full disk, the
-        # command can be repeated.
+        # The profile is written last, because an existing one is refused: after a failure, such as
+        # a full disk, the command can be repeated.
         profile = write_profile(self.kind, out, name, self.camera, self.arming)
         say(
             f"wrote {profile}: check its pins before anything moves\n"
@@ -154,7 +154,7 @@ class RobotKey:
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Name of the robot."""
     credentials: Path | None = None
-    """Folder of its key and certificate; by default the one that `init` made."""
+    """Folder of the robot's key and certificate; by default the one that `init` made."""
     qr: bool = False
     """Show a QR code that opens the console on a phone. It contains the key, so keep it private."""
     address: str = ""
@@ -179,7 +179,7 @@ class RobotKey:
 
         robot = robot_at(self.address or f"{socket.gethostname()}.local", self.name, credentials)
         console = console_address(robot)
-        say(f"\nThe console is at {console}; this brings a phone there:\n")
+        say(f"\nThe console is at {console}; scan this code to open it on a phone:\n")
         # Printed verbatim: wrapping would break the code.
         segno.make(f"{console}#key={robot.key}", micro=False).terminal(sys.stdout, compact=True)
 
@@ -241,7 +241,7 @@ class RobotHome:
     be served meanwhile. Repeat the command whenever the servos were without power; encoders at the
     joints keep their zeros."""
     straight: bool = False
-    """Do not ask, because a person already holds the finger straight."""
+    """Confirm that a person already holds the finger straight, instead of being asked."""
 
     def run(self) -> None:
         path = own_profile(self.profile)
@@ -258,16 +258,16 @@ class RobotHome:
 
 @dataclass(frozen=True)
 class RobotInstall:
-    """Put a robot's service, groups, buses and camera in place on a Raspberry Pi."""
+    """Install a robot's service, and set up its groups, buses and camera, on a Raspberry Pi."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile, which `init` wrote."""
     dry_run: bool = False
-    """Print what would be done, with its commands, and do nothing."""
+    """Only print the changes and their commands."""
     remove: bool = False
-    """Remove the service again; groups and settings of the computer stay."""
+    """Remove the service; groups and settings of the computer are kept."""
     credentials: Path | None = None
-    """Folder of its key and certificate, if not the one that `init` made."""
+    """Folder of the robot's key and certificate; by default the one that `init` made."""
 
     def run(self) -> None:
         path = own_profile(self.profile)
@@ -282,8 +282,8 @@ class RobotInstall:
             machine.require_pi()
             if machine.user == "root":
                 raise RobotError(
-                    "Install it as the user that will run the robot, without sudo, which is "
-                    "called when it is needed."
+                    "Run this without sudo, as the user that will run the robot: the command calls "
+                    "sudo when needed."
                 )
             folder = self.credentials or credentials_folder(profile.name)
             load_credentials(folder)
@@ -311,8 +311,8 @@ class RobotInstall:
         path = profile.path.absolute()
         unit = path.parent / unit_name(profile.name)
         if not unit.exists() and self.dry_run:
-            # `init` wrote one, and this run must not.
-            raise RobotError(f"There is no {unit}: it is written without --dry-run.")
+            # Usually `init` has written the unit. With --dry-run, nothing may be written.
+            raise RobotError(f"{unit} does not exist; without --dry-run, this command writes it.")
         unit, _ = write_unit(profile.name, path, self.credentials, user)
         text = unit.read_text(errors="replace")
         if unit_word(str(path)) not in text or f"\nUser={user}\n" not in text:
@@ -329,7 +329,7 @@ _LAST_PORT: Final = 65535
 def require_port(port: int) -> None:
     """Refuse a number that is not a TCP port; 0 selects any free port."""
     if not 0 <= port <= _LAST_PORT:
-        raise RobotError(f"A port is 0 (any free port) to {_LAST_PORT}, got {port}.")
+        raise RobotError(f"A port must be 0 (any free port) to {_LAST_PORT}, got {port}.")
 
 
 @dataclass(frozen=True)
@@ -346,6 +346,6 @@ class RobotSafePins:
             failures = make_safe(plan, hardware)
         if failures:
             raise RobotError(
-                "Not everything is at rest: take the battery off. " + " ".join(failures)
+                "Not all outputs are at rest: disconnect the battery. " + " ".join(failures)
             )
         say(f"All {len(plan.outputs)} outputs of {plan.name} are at rest.")
