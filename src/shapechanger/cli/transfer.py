@@ -126,8 +126,8 @@ class Transfer(TwoEnvs, StudyRuns):
             raise StudyError(f"--arms names {', '.join(twice)} more than once.")
         if self.map and (self.rule or self.units != "same"):
             raise MapError(
-                "The file of --map defines the whole body map: leave out either --map or both "
-                "--rule and --units."
+                "The file of --map defines the whole body map: leave out --rule and --units, "
+                "or leave out --map."
             )
         allow_own_modules(self.learner, *self.arms)
         task = TransferTask(*self.refs(studied=True, lenses=self.target_lens))

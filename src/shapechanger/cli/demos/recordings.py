@@ -241,7 +241,7 @@ class DemosMerge:
         layouts = {(header.action_layout, header.state_layout) for header in headers}
         if len(layouts) > 1:
             say(
-                f"the episodes have {len(layouts)} different layouts, and a policy learns from one: "
+                f"the episodes have {len(layouts)} different layouts; a policy learns from one: "
                 "`shapechanger demos list` lists their robots"
             )
 

@@ -16,7 +16,7 @@ from shapechanger.robot.hardware import load
 
 
 class _NumberKeys(Keys, frozen=True, kw_only=True):
-    """A camera on the ribbon cable.
+    """Keys of a camera on the ribbon cable.
 
     Attributes:
         number: Number of the camera.
@@ -26,7 +26,7 @@ class _NumberKeys(Keys, frozen=True, kw_only=True):
 
 
 class _DeviceKeys(Keys, frozen=True, kw_only=True):
-    """A webcam.
+    """Keys of a webcam.
 
     Attributes:
         device: Device of the camera.
@@ -36,7 +36,7 @@ class _DeviceKeys(Keys, frozen=True, kw_only=True):
 
 
 class _PathKeys(Keys, frozen=True, kw_only=True):
-    """A folder of JPEG files, or a stream of them.
+    """Keys of a folder of JPEG files, or of a JPEG stream.
 
     Attributes:
         path: The folder; or the source of the stream: a pipe, a file or "| program arguments".
@@ -49,8 +49,8 @@ class CameraKind(NamedTuple):
     """A kind of camera.
 
     Attributes:
-        keys: Its keys in a profile, in addition to the keys that all cameras have.
-        opens: MODULE:NAME of its driver, which is called with the plan.
+        keys: Keys of its settings in a profile, in addition to the keys that all cameras have.
+        opens: MODULE:NAME of its driver, which is called with the camera's plan.
     """
 
     keys: type[Keys]
@@ -74,8 +74,8 @@ class Frame:
     Attributes:
         jpeg: The image as JPEG.
         captured_ns: Time of capture on the robot's monotonic clock, ns.
-        encoded_here: Whether this process encoded the JPEG from an image of the right size. Such a
-            frame decodes, so it needs no further check.
+        encoded_here: Whether this process has encoded the JPEG from an image of the right size, so
+            that the frame needs no further check.
         skipped: Number of bytes between the previous frame and this one that belong to no frame.
     """
 
@@ -118,7 +118,7 @@ class CameraPlan:
 
 
 class Camera:
-    """Source of frames, read by one thread; `close` may be called from any thread and ends waits.
+    """Source of frames. One thread may call `read`; any thread may call `close`, which ends waits.
 
     Args:
         plan: The camera.
@@ -142,7 +142,7 @@ class Camera:
         """Wait until a descriptor is readable.
 
         Returns:
-            Whether it is; False after `at_most_s` seconds.
+            Whether the descriptor is readable; False after `at_most_s` seconds.
         """
         poll = select.poll()
         for one in (self._woken,) if fd is None else (self._woken, fd):
@@ -155,7 +155,7 @@ class Camera:
     def pace(self) -> int:
         """Wait until the next frame is due at the plan's rate; return that time: monotonic, ns.
 
-        A late frame is due at once, and the rate continues from there.
+        A late frame is due at once, and later frames are counted from its time.
         """
         period_ns = round(1e9 / self.plan.fps)
         self.wait(at_most_s=max(0, self._next_ns - time.monotonic_ns()) / 1e9)
@@ -170,7 +170,7 @@ class Camera:
             os.write(self._wake, b"\0")
 
     def __del__(self) -> None:
-        # Not in `close`: another thread may still be waiting on them.
+        # Not in `close`: another thread may still be waiting on these descriptors.
         os.close(self._woken)
         os.close(self._wake)
 

@@ -24,7 +24,7 @@ def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
 
     The header and the end of the data are checked; the frame is decoded only to rotate it.
     """
-    if not simplejpeg.is_jpeg(jpeg) and len(jpeg) <= _MAX_JPEG:  # Some cameras pad their frames.
+    if not simplejpeg.is_jpeg(jpeg) and len(jpeg) <= _MAX_JPEG:  # Remove padding of some cameras.
         splitter = JpegSplitter()
         splitter.feed(jpeg)
         jpeg = splitter.next() or jpeg
@@ -42,13 +42,13 @@ def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
         _require_size(int(width), int(height), plan)
         if not plan.flip:
             return Frame(jpeg, captured_ns)
-        # Strict: without it, missing blocks would become grey, and the new JPEG would hide that.
+        # Without `strict`, missing blocks would become grey, and the new JPEG would look complete.
         image = simplejpeg.decode_jpeg(jpeg, strict=True)
     return encoded_frame(image[::-1, ::-1], captured_ns, plan)
 
 
 def encoded_frame(image: NDArray[np.uint8], captured_ns: int, plan: CameraPlan) -> Frame:
-    """Return the frame of an image of the camera's size, RGB, shape (height, width, 3)."""
+    """Encode an image of the camera's size, RGB, shape (height, width, 3), as a frame."""
     _require_size(image.shape[1], image.shape[0], plan)
     jpeg = simplejpeg.encode_jpeg(
         np.ascontiguousarray(image), plan.jpeg_quality, colorsubsampling="420"
@@ -81,11 +81,11 @@ _LONGEST_TABLE: Final = 2 + 8 * (17 + 256)
 
 
 class JpegSplitter:
-    """Split a byte stream into JPEG frames.
+    """Splits a byte stream into JPEG frames.
 
     A frame is parsed from marker to marker, so that a thumbnail in it, or a marker in a comment,
-    does not end it. Bytes outside frames are skipped: the headers between the parts of an HTTP
-    stream, padding, a frame that was cut off.
+    does not end it. Bytes outside complete frames are skipped, such as the headers between the
+    parts of an HTTP stream, padding, and incomplete frames.
 
     Attributes:
         skipped: Number of bytes skipped so far.
@@ -97,7 +97,7 @@ class JpegSplitter:
         self._since_frame = 0  # Bytes skipped since the last frame.
 
     def feed(self, data: bytes) -> None:
-        """Append bytes."""
+        """Append bytes of the stream."""
         self._data += data
 
     def next(self) -> bytes | None:
@@ -169,23 +169,23 @@ def _length(data: bytes | bytearray) -> int | None:
 
 
 def _start_of_another(jpeg: bytes) -> int:
-    """Return where the complete frame begins that ends with these bytes; 0 for their start.
+    """Return the start of another complete frame that ends where `jpeg` ends; 0 without one.
 
-    The length of a segment that is cut off may extend into the next frame, up to a marker there. A
-    thumbnail ends before its frame.
+    If a frame is cut off, the length of its last segment may reach into the next frame, so that
+    both look like one. A thumbnail is no such frame, because it ends before the outer frame.
     """
     starts = (found.start() for found in _ANOTHER.finditer(jpeg, len(_START)))
     return next((at for at in starts if _length(jpeg[at:]) == len(jpeg) - at), 0)
 
 
 def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
-    """Add the capture time, ns, to a JPEG, as a comment segment; see `captured_ns_of`."""
+    """Add the capture time to a JPEG as a comment segment; see `captured_ns_of`."""
     comment = b"captured_ns=%d" % captured_ns
     return _START + bytes((0xFF, _COMMENT)) + (len(comment) + 2).to_bytes(2) + comment + jpeg[2:]
 
 
 def captured_ns_of(jpeg: bytes) -> int | None:
-    """Return the time in a comment segment `captured_ns=<integer>`, or None."""
+    """Return the capture time, ns, from a comment segment `captured_ns=<integer>`, or None."""
     at = len(_START)
     while at + 4 <= len(jpeg) and jpeg[at] == 0xFF and jpeg[at + 1] != _SCAN:
         end = at + 2 + int.from_bytes(jpeg[at + 2 : at + 4])

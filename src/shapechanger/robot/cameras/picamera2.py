@@ -16,7 +16,7 @@ from shapechanger.robot.cameras.jpeg import encoded_frame
 
 _SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
 
-# The name describes a word in memory: "BGR888" is red, green, blue in byte order.
+# The bytes of a pixel in "BGR888" are red, green, blue: the name has the order in a word.
 _FORMAT: Final = "BGR888"
 
 
@@ -24,7 +24,7 @@ class PiCamera(Camera):
     """Camera on the Pi's own connector; see `Camera`. Its setting is its `number`, from 0.
 
     Raises:
-        RobotError: If picamera2 is not installed, or there is no such camera.
+        RobotError: If picamera2 is not installed, or the system has no camera with this number.
     """
 
     def __init__(self, plan: CameraPlan) -> None:
@@ -52,7 +52,7 @@ class PiCamera(Camera):
                 self._camera.create_video_configuration(
                     main={"size": plan.size, "format": _FORMAT},
                     transform=Transform(hflip=int(plan.flip), vflip=int(plan.flip)),
-                    # Flush: a frame from before the call would be old (picamera2#787).
+                    # Do not queue a frame, which would be older than the request (picamera2#787).
                     queue=False,
                     controls={"FrameDurationLimits": (period_us, period_us)},
                 )
@@ -74,7 +74,7 @@ class PiCamera(Camera):
                 request = self._camera.capture_request(wait=_SILENT_S)
             stack.callback(request.release)
             image = request.make_array("main")
-            # SensorTimestamp: nanoseconds of the monotonic clock at the first line's exposure.
+            # The monotonic time, ns, at the exposure of the first line.
             captured_ns = int(request.get_metadata()["SensorTimestamp"])
         return encoded_frame(image, captured_ns, self.plan)
 

@@ -35,10 +35,10 @@ _SUFFIXES: Final = (".jpg", ".jpeg")
 class Pipe(Camera):
     """JPEG stream from a named pipe, a file or a program such as rpicam-vid; see `Camera`.
 
-    A frame may carry its time of capture in a comment segment (`captured_ns=`, monotonic).
-    Otherwise it gets the arrival time of its last byte, which hides the delay of the source. Frames
-    that waited in the pipe would look new, so the pipe is drained first, and the newest of several
-    frames is returned, except from a file.
+    A frame may have its time of capture in a comment segment (`captured_ns=`, monotonic). Otherwise
+    its time is the arrival of its last byte, which does not include the delay of the source. A
+    frame that waited in a pipe would look new, so all waiting frames are read, and the newest one
+    is returned. A file is read frame by frame.
 
     Its setting is `path`: a pipe, a file, or a program with arguments after `|`.
     """
@@ -84,7 +84,7 @@ class Pipe(Camera):
             self._program.wait()
 
     def __del__(self) -> None:
-        # Not in `close`: a `read` in another thread may still be waiting on it.
+        # Not in `close`: a `read` in another thread may still be waiting on the stream.
         super().__del__()
         if self._fd >= 0:
             os.close(self._fd)
@@ -143,7 +143,7 @@ class Folder(Camera):
         self._files = cycle(files)
 
     def read(self) -> Frame:
-        """Wait for the next frame; see `Camera.read`. A bad file is reported once, then skipped."""
+        """Wait for the next frame; see `Camera.read`. A bad file is skipped after its error."""
         captured_ns = self.pace()
         file = next(self._files)
         with translate_errors(OSError, RobotError, to=lambda error: RobotError(f"{file}: {error}")):
@@ -197,7 +197,7 @@ class Pattern(Camera):
 
     def __init__(self, plan: CameraPlan) -> None:
         super().__init__(plan)
-        self._draw(0)  # Raises for a size that is too small.
+        self._draw(0)  # Refuse a size that is too small.
 
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`."""

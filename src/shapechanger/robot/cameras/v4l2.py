@@ -1,7 +1,7 @@
 """Camera driver for a JPEG webcam over Video4Linux2.
 
-Tested against a fake of the kernel's calls only, not on a camera. Structures and numbers are those
-of linux/videodev2.h on a 64-bit system.
+Tested against a fake of the kernel's calls only, not on a camera. Structures and numbers are from
+linux/videodev2.h on a 64-bit system.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ class BufferRequest(ctypes.Structure):
 
 
 class V4l2(Camera):
-    """Webcam; see `Camera`. Of several ready frames the newest is returned.
+    """Webcam; see `Camera`. If several frames are ready, the newest is returned.
 
     Args:
         plan: The camera; its setting is the `device`, such as /dev/video0.
-        ioctl: Calls the kernel.
+        ioctl: Function that calls the kernel, like `fcntl.ioctl`.
     """
 
     def __init__(
@@ -88,7 +88,9 @@ class V4l2(Camera):
     ) -> None:
         super().__init__(plan)
         if ctypes.sizeof(ctypes.c_void_p) != 8:
-            raise RobotError("The v4l2 camera needs a 64-bit system; use `pipe` with ffmpeg.")
+            raise RobotError(
+                "The v4l2 camera needs a 64-bit system: use the camera `pipe` with ffmpeg."
+            )
         self._ioctl = ioctl
         self._device: str = plan.settings["device"]
         self._buffers: list[mmap.mmap] = []
@@ -132,7 +134,7 @@ class V4l2(Camera):
         for index in range(_BUFFERS):
             buffer = Buffer(index=index, type=_CAPTURE, memory=_MEMORY_MMAP)
             self._ioctl(self._fd, QUERY_BUFFER, buffer)
-            offset = buffer.offset & 0xFFFFFFFF  # A union, of which the kernel sets 32 bits.
+            offset = buffer.offset & 0xFFFFFFFF  # The kernel sets only 32 bits of this union.
             self._buffers.append(mmap.mmap(self._fd, buffer.length, offset=offset))
             self._ioctl(self._fd, QUEUE, buffer)
         self._ioctl(self._fd, STREAM_ON, ctypes.c_int(_CAPTURE))

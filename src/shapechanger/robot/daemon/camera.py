@@ -34,8 +34,8 @@ class FrameChecks:
         """Return the reason to reject a frame, or "" if it is valid and new."""
         if not frame.encoded_here:
             try:
-                # The driver has checked the header. Strict rejects missing data, which a decoder
-                # would otherwise fill with grey.
+                # The driver has checked the header. `strict` rejects missing data; otherwise the
+                # decoder would fill it with grey.
                 simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
             except ValueError as error:
                 return f"The camera sent a JPEG that cannot be decoded: {error}."
@@ -52,7 +52,7 @@ class FrameChecks:
 
 
 class FrameReader:
-    """Reads a camera in a thread, from now until `close`, and reopens it after failures."""
+    """Reads a camera in a thread until `close`, and reopens it after failures."""
 
     def __init__(
         self,
@@ -104,10 +104,12 @@ class FrameReader:
                     good, bad = True, 0
                     self._deliver(frame)
                     if frame.skipped and not self._skips:
-                        self._skips = True  # Some streams have bytes between all frames.
+                        self._skips = (
+                            True  # Report once: some streams have bytes between all frames.
+                        )
                         self._report(
-                            f"The camera's stream has bytes between its frames that are no JPEG, "
-                            f"{frame.skipped} before this one: they are skipped."
+                            f"The camera's stream has bytes between its JPEG frames, "
+                            f"{frame.skipped} before this frame: they are skipped."
                         )
                     if self._trouble:
                         self._trouble = ""

@@ -12,7 +12,7 @@ from shapechanger.robot.link import messages
 NOT_READING: Final = "The client does not read its messages."
 
 _MAX_MESSAGES: Final = 256
-# Kinds of which only the newest messages are kept.
+# Number of newest messages to keep, keyed by type; messages of other types are all kept.
 _KEPT: Final = {messages.Lease: 1, messages.RecorderState: 1, messages.Event: 32}
 
 
@@ -39,7 +39,7 @@ class Client:
         role: "person" or "program".
         posted: Set when a message waits.
         updated: Set when an observation may be due.
-        expelled: Reason why the connection must end, a sentence; "" if it may go on.
+        expelled: Reason why the connection must end, a sentence; "" if it may continue.
     """
 
     def __init__(self, session: int, name: str = "", role: messages.Role = "program") -> None:
@@ -74,10 +74,10 @@ class Client:
         return self._messages.popleft() if self._messages else None
 
     def awaits(self, *kinds: type[messages.RobotMessage]) -> bool:
-        """Return True if a message of one of these types, or of any without types, is queued."""
+        """Return True if a message of one of `kinds` is queued; without `kinds`, of any type."""
         return any(isinstance(message, kinds or object) for message in self._messages)
 
     def expel(self, reason: str) -> None:
-        """End the connection, for a reason that is a sentence."""
+        """End the connection; `reason` must be a sentence."""
         self.expelled = reason
         self.posted.set()

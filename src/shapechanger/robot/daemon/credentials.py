@@ -30,8 +30,8 @@ class Credentials:
     """Key and certificate that identify a robot to its clients.
 
     Attributes:
-        folder: Folder of their files.
-        key: Key that clients must hold, as people write it.
+        folder: Folder of the files of key and certificate.
+        key: Key that clients must prove to have, as letters and digits.
         fingerprint: SHA-256 of the certificate (DER).
     """
 
@@ -111,7 +111,7 @@ def make_credentials(folder: Path, name: str) -> Credentials:
     ):
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         for file, content, mode in zip(files, contents, (0o600, 0o600, 0o644), strict=True):
-            # On a full disk, for example: partial credentials would block the next attempt.
+            # If a write fails, as on a full disk, partial credentials would block the next attempt.
             undo.callback(file.unlink, missing_ok=True)
             write_new(file, content, mode)
         undo.pop_all()
@@ -125,7 +125,7 @@ def load_credentials(folder: Path) -> Credentials:
             mode = file.stat().st_mode
         if mode & _OTHERS:
             raise RobotError(
-                f"Other users can read {file}. Run `chmod 600 {file}`, or better, make a new one."
+                f"Other users can read {file}. Run `chmod 600 {file}`, or better, make a new key."
             )
     with _readable(folder / _KEY):
         key = (folder / _KEY).read_text().strip()
@@ -157,7 +157,7 @@ def _readable(file: Path) -> contextlib.AbstractContextManager[None]:
 
 def _self_signed(name: str) -> tuple[bytes, bytes]:
     """Return a certificate and its private key, both PEM."""
-    # Imported here, to keep 10 MB out of the daemon.
+    # Imported only here, because the import takes 10 MB, and the daemon does not need it.
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization
     from cryptography.hazmat.primitives.asymmetric import ec

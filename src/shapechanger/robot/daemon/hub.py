@@ -28,10 +28,10 @@ _MAX_CLIENTS: Final = 8
 """Most clients connected at the same time."""
 
 _MAX_PROGRAMS: Final = 6
-"""Most programs among them, so that two people can connect without displacing anyone."""
+"""Most programs among these clients, so that two people can connect without displacing any."""
 
 _NS_PER_MS: Final = 1_000_000
-_ARRIVALS: Final = 64  # Arrival times to remember; more than commands can be under way.
+_ARRIVALS: Final = 64  # Arrival times to store; more than commands can be pending.
 _APPLIED: Final = "/applied"
 _ABSENT: Final = "absent"
 _FRAME_WAIT_S: Final = 2.0  # Real time that a frame may spend in the camera's driver.
@@ -66,7 +66,7 @@ class SessionHub:
         action_size: Number of values of a command.
         state: Newest state of the guard.
         frame: Newest frame, or None.
-        frame_seq: Its number, from 1; 0 before the first.
+        frame_seq: Number of the newest frame, from 1; 0 before the first frame.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class SessionHub:
         others = [other for other in self._clients.values() if other is not self.holder]
         self._clients[client.session] = client
         if is_full:
-            # The person may need to stop the robot, so they always get a place.
+            # The person may need to stop the robot, so they are always accepted.
             others[0].expel(f"{client.name} connected, and {_MAX_CLIENTS} clients are the limit.")
             self.leave(others[0])
 
@@ -193,7 +193,7 @@ class SessionHub:
 
     def halt(self) -> None:
         """Drop the newest command, because the lease holder sent an invalid one after it."""
-        # Not `give_order`: the sender waits for an observation anyway, so time need not step.
+        # Not `give_order`, which may add a step of time: the sender's next observation is a step.
         self._command = _NOTHING
         self._order(Order(kind="halt", issued_ns=self.now_ns()))
 
@@ -210,7 +210,7 @@ class SessionHub:
     def observation(self, client: Client, seq: int, frame_sent: int | None) -> messages.Observation:
         """Build the observation for one client.
 
-        `frame_sent` is the number of the last frame sent to it; None if it requests no frames.
+        `frame_sent` is the number of the last frame sent to it, or None to send no frame.
         """
         now_ns, state, frame, holder = self.now_ns(), self.state, self.frame, self.holder
         at_ns = state.at_ns or now_ns
@@ -277,7 +277,7 @@ class SessionHub:
         self._notify()
 
     async def step(self, seconds: float) -> None:
-        """Let `seconds` of the robot's time pass, and collect all state and events meanwhile."""
+        """Let `seconds` of the robot's time pass, and then handle the states of the guard."""
         if self.in_steps:
             # Finish a step even if its client disconnects, so that the clock stays consistent.
             await asyncio.shield(asyncio.ensure_future(self._one_step(seconds)))
@@ -286,7 +286,7 @@ class SessionHub:
             self._drain()
 
     async def settle(self) -> None:
-        """Let the guard handle an order that was just given; only needed if time is stepped."""
+        """If time moves in steps, let the guard handle an order that was just given."""
         if self.in_steps and self._unsettled:
             self._unsettled = False
             await self.step(1.0 / self.plan.card.tick_hz)

@@ -34,7 +34,7 @@ _MAX_TEXT: Final = 200
 class RecordingLibrary:
     """Answers requests about a folder of episodes, one after another, in a separate thread.
 
-    An unchanged episode is read once for the list.
+    The summary of an episode is kept until the episode changes.
     """
 
     def __init__(self, folder: Path, call: Callable[[Callable[[], None]], None]) -> None:
@@ -52,7 +52,7 @@ class RecordingLibrary:
         self._worker.close()
 
     def _answer(self, question: Question) -> Answer:
-        """Answer a request; errors of the disk become refusals."""
+        """Answer a request; an error becomes a refusal."""
         try:
             match question:
                 case messages.Browse():
@@ -71,7 +71,7 @@ class RecordingLibrary:
         """Summarise one episode; if it is unreadable, its outcome is the error."""
         path = self._folder / name
         try:
-            # Values that change whenever the episode changes.
+            # These values change whenever the episode changes.
             found = ((path / STEPS).stat(), (path / HEADER).stat())
             stamp = tuple((one.st_mtime_ns, one.st_size, one.st_ino) for one in found)
             known = self._known.get(name)
@@ -152,11 +152,11 @@ class LineIndex:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._ends: array[int] = array("Q", [0])  # 0, and the offset behind each complete line.
+        self._ends: array[int] = array("Q", [0])  # 0, and the end of each complete line.
         self._inode = -1
 
     def __len__(self) -> int:
-        """Return the number of complete lines when they were read last."""
+        """Return the number of complete lines at the last call of `lines`."""
         return len(self._ends) - 1
 
     def lines(self, first: int, count: int) -> Iterator[str]:

@@ -17,15 +17,15 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
     Attributes:
         card: Facts of the robot.
-        camera: Settings of the camera; None without one.
+        camera: Settings of the camera; None without a camera.
         host: Address to listen at.
         port: Port to listen at; 0 for any free port.
         credentials: Folder of the robot's key and certificate; "" for none, and no TLS.
-        insecure: Whether to serve without TLS, other machines too.
+        insecure: Whether to serve without TLS, also to other machines.
         discovery: Whether to announce the robot on the local network.
         ready_file: File that the port is written to; "" for none.
         recordings: Folder of the recorded episodes; "" for none.
-        policies: Folder of the policies that may drive on board; "" for none.
+        policies: Folder of the policies that may run on the robot's computer; "" for none.
         policy: Name of the policy that starts with the robot; "" for none.
         pilot: Module of the program that runs a policy; "" for none.
     """

@@ -44,7 +44,7 @@ class _Said(msgspec.Struct):
 
 
 def policies_in(folder: Path) -> list[str]:
-    """Return the names of the policies in a folder, sorted; () if it cannot be read."""
+    """Return the names of the policies in a folder, sorted; empty if it cannot be read."""
     files: list[str] = []
     with contextlib.suppress(OSError):
         files = sorted(path.name for path in folder.iterdir() if path.suffix == ENDING)
@@ -64,7 +64,7 @@ class PolicyRunner:
         self._task: asyncio.Task[None] | None = None
 
     def serve(self, port: int, key: str, fingerprint: bytes) -> None:
-        """Start the policy that starts with the robot, once the robot can be reached."""
+        """Set how policies reach the robot, and start the policy that starts with it, if any."""
         self._robot = {
             "name": self._plan.card.robot,
             "address": str(address_here(self._plan.host, port)),
@@ -83,7 +83,7 @@ class PolicyRunner:
         return PolicyState(names=tuple(names), running=self._running, text=self._text)
 
     def run(self, name: str) -> None:
-        """Start a policy instead of the running one, or end the running one."""
+        """End the running policy, and start the policy `name` unless it is ""."""
         if not self._plan.policies:
             raise Declined("This robot has no policies on board: serve it with --policy.")
         names = policies_in(Path(self._plan.policies))
@@ -129,12 +129,12 @@ class PolicyRunner:
     async def _listen(
         self, stdin: asyncio.StreamWriter, stdout: asyncio.StreamReader, name: str
     ) -> str:
-        """Give a policy's process its task, report its notes, and return why it failed, or ""."""
+        """Send its task to a policy's process, report its notes, and return its failure, or ""."""
         task = {"policy": str(Path(self._plan.policies, name + ENDING)), "robot": self._robot}
         failure = ""
         try:
-            # The key goes through a pipe, because other users can read command lines. The pipe
-            # stays open: if it is closed, this process has ended.
+            # The key is sent through a pipe, because other users can read command lines. The pipe
+            # stays open, so that the policy's process can detect the end of this process.
             stdin.write(json.dumps(task).encode() + b"\n")
             await stdin.drain()
             while line := await stdout.readline():

@@ -51,7 +51,7 @@ _READY_S: Final = 1.0
 
 
 class GuardLink:
-    """Non-blocking socket to the guard, in the running event loop: sends orders, receives states.
+    """Sends orders to the guard and receives its states, on a non-blocking socket.
 
     A guard that does not read fills the socket. A command is then dropped, because it would be
     too old when the guard reads again, and a stop waits until there is room.
@@ -154,7 +154,7 @@ class Daemon:
         """Serve until `end` is called.
 
         Returns:
-            The reason why it ended; "" if it was asked to.
+            The reason of an unexpected end; "" after a request to end.
         """
         hub, plan = self._hub, self._hub.plan
         credentials.check_exposure(plan)
@@ -170,8 +170,8 @@ class Daemon:
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
-            # The first client must not see a robot of unknown state. Where time moves in steps,
-            # the guard reports nothing before the first step.
+            # The first client must not see a robot of unknown state. If time moves in steps, the
+            # guard reports no state before the first step.
             if not hub.in_steps:
                 await self._guard_reported.wait()
             if not self._ended.is_set():
@@ -185,7 +185,7 @@ class Daemon:
                     announcement = await announce(plan.card, plan.host, port, fingerprint)
             await self._ended.wait()
         finally:
-            # Closed first, because the guard then stops the robot.
+            # The socket to the guard is closed first, because the guard then stops the robot.
             self._guard.close()
             if hub.recorder.on:
                 hub.recorder.end()
@@ -299,16 +299,16 @@ def send_lifeline(guard_fd: int) -> None:
     """Send the guard a descriptor that closes as soon as this process dies.
 
     When a process is killed, the kernel frees its memory before it closes its files. For the
-    daemon's 50 MB that takes 6 ms, in which the guard would wait for the end of the socket. The
-    files of a thread that shares the memory but not the files close at once. Such a thread holds
-    one end of a pipe, and the guard the other. `python -m benchmarks.run robot-faults` measures
+    daemon's 50 MB that takes 6 ms, in which the guard would wait for the end of the socket. If a
+    thread has a separate table of files, its files are closed at once. Such a thread holds one end
+    of a pipe, and the guard holds the other end. `python -m benchmarks.run robot-faults` measures
     0.5 ms instead of 7 ms.
 
-    Where the system does not permit it, the guard waits for the end of the socket. Call this while
-    few files are open and no other thread runs.
+    If the system permits no such thread, the guard waits for the end of the socket. Call this
+    function while few files are open and no other thread runs.
     """
     ours, theirs = os.pipe()
-    # The new thread gets a copy of each file; this one is then closed here.
+    # The new thread gets copies of all descriptors, so `theirs` can be closed here afterwards.
     held = threading.Event()
     threading.Thread(
         target=_hold, args=(theirs, held), name="shapechanger-life", daemon=True
@@ -332,7 +332,7 @@ def _hold(fd: int, held: threading.Event) -> None:
     os.closerange(0, fd)
     os.closerange(fd + 1, os.sysconf("SC_OPEN_MAX"))
     ended = select.poll()
-    ended.register(fd, 0)  # Only the error condition that the other end is closed.
+    ended.register(fd, 0)  # Without flags, poll reports only that the other end was closed.
     held.set()
     ended.poll()
 

@@ -51,7 +51,7 @@ class _Decided(NamedTuple):
 
 
 class Worker:
-    """Thread that runs jobs in order; it is a daemon thread, so a hanging disk cannot block exit.
+    """Thread that runs jobs in order. A daemon thread: a disk that hangs cannot block the exit.
 
     `call` calls a function in the event loop's thread.
     """
@@ -83,8 +83,8 @@ class _Episode:
 
     def __init__(self, folder: Path, header: EpisodeHeader, starter: Client) -> None:
         self.starter = starter
-        # Used in the event loop only: the newest state, whose text is an error that ended the
-        # episode; the number of queued jobs, and the bytes of their frames.
+        # Used in the event loop only: the newest state, with the text of an error that ended the
+        # episode, the number of queued jobs, and the number of bytes of their frames.
         self.progress = messages.RecorderState()
         self.jobs = self.bytes = 0
         self._trouble = ""
@@ -120,7 +120,7 @@ class _Episode:
         )
 
     def add(self, step: Step, jpeg: bytes | None, writer: EpisodeWriter) -> None:
-        """Write a step, with its frame; None if it repeats the previous step's."""
+        """Write a step with its frame; `jpeg` is None if the previous step has the same frame."""
         if writer.is_full:
             self._writer = writer = writer.continued()
         writer.add(step, jpeg)
@@ -163,7 +163,7 @@ class Recorder:
         return msgspec.structs.replace(progress, recording=self.on, text=text)
 
     def observed(self, client: Client, observation: messages.Observation) -> None:
-        """Complete the step of a client with the next observation that it is sent."""
+        """Complete the pending step of a client with the next observation sent to it."""
         decided = self._decided
         if decided is None or decided.client is not client:
             return
@@ -177,7 +177,7 @@ class Recorder:
         self._complete()
 
     def decided(self, client: Client, sent: Sent, values: tuple[float, ...], now_ns: int) -> None:
-        """Note a command of a client, and complete a step that answers another observation."""
+        """Start a step with a command; first complete a step that answers another observation."""
         newest, seen = self._newest, sent.observation
         if not self.on:
             return
@@ -225,7 +225,7 @@ class Recorder:
         self._stop(self._recorded(), text)
 
     def edit(self, request: messages.Mark | messages.Undo, client: Client) -> None:
-        """Mark the newest step, or drop the newest ones, after the pending step."""
+        """Mark the newest step, or drop the newest steps; the pending step is written first."""
 
         def write(writer: EpisodeWriter) -> None:
             if isinstance(request, messages.Undo):
@@ -274,7 +274,7 @@ class Recorder:
             self._put(episode, partial(episode.add, step, jpeg), size=size)
         else:
             self._stop(episode, DISK_TOO_SLOW)
-            self._broadcast(self.state())  # Sent again when the disk responds.
+            self._broadcast(self.state())  # The state is sent again when the disk responds.
 
     def _stop(self, episode: _Episode, outcome: str) -> None:
         self.on, self._decided = False, None

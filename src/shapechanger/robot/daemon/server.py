@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 
 _PRE_AUTH_TIMEOUT_S: Final = 3.0  # Time limit for each request before authentication.
 _MAX_TOTAL: Final = 48
-_MAX_PER_ADDRESS: Final = 16  # A browser opens six, and a person may have two pages open.
+_MAX_PER_ADDRESS: Final = 16  # A browser opens six connections, and two pages may be open.
 _BACKLOG: Final = 32
 _SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a few frames.
 _ACCEPT_PAUSE_S: Final = 0.05  # Pause after a failed accept, usually a lack of descriptors.
@@ -37,9 +37,9 @@ _ACCEPT_PAUSE_S: Final = 0.05  # Pause after a failed accept, usually a lack of 
 class Listener:
     """Accepts connections, and limits the number and time of unauthenticated ones.
 
-    Each one is registered before its TLS handshake. A new connection is never refused, because it
-    may come from the person who wants to stop the robot: it replaces the oldest connection from the
-    address with the most connections.
+    A connection is registered before its TLS handshake. A new connection is never refused, because
+    it may come from the person who wants to stop the robot. At the limit, it replaces the oldest
+    connection from the address with the most connections.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class Listener:
             self.add(key, connection)
 
     def stop_timer(self, key: Hashable) -> None:
-        """End the timeout of a connection that opened the link, whose hello has its own limit."""
+        """End the timeout of a connection that opened the link; its hello has another timeout."""
         if connection := self._waiting.get(key):
             connection.timer.cancel()
 
@@ -171,7 +171,9 @@ class AcceptedSocket:
         if self._protocol.transport is not None:
             self._protocol.transport.abort()
             return
-        with contextlib.suppress(OSError):  # The handshake reads the end of the stream.
+        with contextlib.suppress(
+            OSError
+        ):  # This ends a handshake, which reads the end of the data.
             self._socket.shutdown(socket.SHUT_RDWR)
 
     async def _connect(self, tls: ssl.SSLContext | None) -> None:
@@ -192,7 +194,7 @@ _HEADERS: Final = {
         "connect-src 'self'; base-uri 'none'; frame-ancestors 'none'; form-action 'none'"
     ),
     "Referrer-Policy": "no-referrer",
-    "Server": "shapechanger",  # Without the versions of the libraries.
+    "Server": "shapechanger",  # Hides the versions of the libraries.
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
@@ -215,7 +217,7 @@ def console_files(folder: Path = _FOLDER) -> dict[str, tuple[str, bytes]]:
     """Return the media type and the content (UTF-8) of each file of the console.
 
     Raises:
-        RobotError: If they cannot be read, for example after a failed installation.
+        RobotError: If a file cannot be read, for example after a failed installation.
     """
     failed = f"Cannot read the console in {folder}"
     with translate_errors(OSError, to=lambda error: RobotError(f"{failed}: {error}.")):
@@ -232,8 +234,8 @@ def console_files(folder: Path = _FOLDER) -> dict[str, tuple[str, bytes]]:
 def origin_refusal(origin: str | None, host: str, *, is_open: bool) -> str:
     """Return the reason why a web page must not open a connection, or "" if it may.
 
-    The console of a robot that accepts every client (`is_open`) must be opened by an address that
-    no foreign name server can control (DNS rebinding).
+    If the robot accepts every client (`is_open`), its console must be opened by an address that no
+    foreign name server controls (DNS rebinding).
     """
     if origin is None:
         return ""
@@ -296,14 +298,14 @@ class Server:
         self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
         response = await handler(request)
-        # A slow radio loads the files of the console one by one.
+        # Over a slow radio, the files of the console arrive one by one within this timeout.
         self._listener.renew(request.protocol)
         return response
 
     async def _robot(self, _: web.Request) -> web.Response:
         """Describe the robot to a page before authentication."""
-        # A page cannot read the certificate of its connection, but the proof needs its fingerprint,
-        # which is not secret.
+        # The proof needs the certificate's fingerprint, which a page cannot read from its
+        # connection. The fingerprint is not secret.
         return web.json_response(
             {
                 "robot": self._hub.plan.card.robot,
@@ -316,7 +318,7 @@ class Server:
     async def _health(self, _: web.Request) -> web.Response:
         at_ns = self._hub.state.at_ns
         heard = at_ns and self._hub.now_ns() - at_ns <= _GUARD_SILENT_NS
-        # A twin's time stands still while no client drives, and its guard is silent then.
+        # A twin's time stands still while no client drives, and its guard then reports no state.
         if heard or self._hub.in_steps:
             return web.json_response({"guard": "well"})
         return web.json_response({"guard": "silent"}, status=503)

@@ -33,8 +33,8 @@ HELLO_TIMEOUT_S: Final = 3.0
 
 _log = logging.getLogger(__name__)
 
-_LARGEST_VALUE: Final = 1e6  # The guard clips to 1 in any case; this keeps sums from overflowing.
-_WINDOW: Final = 64  # More than a second at 50 Hz; older observations are stale in any case.
+_LARGEST_VALUE: Final = 1e6  # Prevents overflow of sums; the guard clips values to 1.
+_WINDOW: Final = 64  # Observations to store: over a second at 50 Hz; older ones are stale.
 _NS_PER_MS: Final = 1_000_000
 _SEND_S: Final = 2.0  # A client that does not read for this long is disconnected.
 _CLOSE_S: Final = 1.0
@@ -45,9 +45,9 @@ _HEARTBEAT_S: Final = 4.0
 # not delay a client with the right key at the same address.
 _WRONG_KEY_S: Final = 0.5
 
-# If the camera is about as fast as the commands, it sets the pace, so that each observation has a
-# new frame. The robot waits for a frame that is a little late, because an observation without it
-# would use up the client's credit.
+# If the camera's rate is within this factor of the control rate, observations are sent at its pace,
+# so that each has a new frame. The robot waits for a frame that is a little late, because an
+# observation without it would use up the client's credit.
 _FRAME_PACE: Final = 1.25
 
 
@@ -201,7 +201,7 @@ class Session:
                 raise LinkError("The hello was sent already.")
 
     def observe(self) -> messages.Observation:
-        """Build the observation to send now, which uses up the credit."""
+        """Build the observation to send now, and use up the credit for it."""
         hub = self._hub
         self._observation_seq += 1
         frame_sent = self._frame_seq if self._wants_frames else None
@@ -210,7 +210,7 @@ class Session:
         hub.recorder.observed(self.client, observation)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
-        if self._pace == "lockstep":  # The robot sets the pace, at any rate.
+        if self._pace == "lockstep":  # The robot sets the pace, so the client cannot flood it.
             self._tokens = min(self._messages_per_s, self._tokens + 1.0)
         self._credit = False
         return observation
@@ -229,7 +229,7 @@ class Session:
         self.client.updated.set()
 
     def _receive_values(self, message: messages.Command | messages.Suggest) -> None:
-        """Handle a command, or a suggestion; both ask for the next observation."""
+        """Handle a command or a suggestion; either requests the next observation."""
         hub, kind, is_command = self._hub, type(message), isinstance(message, messages.Command)
         newest = self._newest_seq[kind]
         self._newest_seq[kind] = max(newest, message.seq)
@@ -249,8 +249,8 @@ class Session:
         elif not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in message.values):
             fault = f"The values of a command must be finite and at most {_LARGEST_VALUE:g}."
         if fault:
-            # The invalid command supersedes the previous one. A late or repeated command does not,
-            # and must not stop a newer one.
+            # An invalid command supersedes the previous command. A late or repeated command does
+            # not, and must not stop a newer command.
             if is_command:
                 hub.halt()
             raise Declined(fault)
@@ -261,7 +261,7 @@ class Session:
             hub.suggest(self.client, message.values)
 
     def _answered(self, seq: int, result: str = "") -> Sent:
-        """Return the observation that a message answers, unless it is too late to act on it."""
+        """Return the observation that a message answers; raise `Declined` if it is too old."""
         sent = next((sent for sent in self._sent if sent.observation.seq == seq), None)
         if sent is None:
             raise Declined(f"{result}Observation {seq} was not sent to this client recently.")
@@ -285,7 +285,7 @@ class Session:
         if not person and hub.holder is not self.client:
             raise Declined("Only the client in control, or a person, can arm this robot.")
         self._answered(arm.answers, "Not armed. ")
-        # The guard counts every emergency stop; this process sees only the reported ones.
+        # Only the guard has counted all emergency stops, so it compares the number in `arm`.
         hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
     def _library_answered(self, answer: Answer) -> None:
@@ -295,7 +295,7 @@ class Session:
     async def run(
         self, request: web.Request, on_known: Callable[[], object]
     ) -> web.WebSocketResponse:
-        """Serve the client until it leaves; `on_known` is called once it has authenticated."""
+        """Serve the client until it disconnects; call `on_known` once it has authenticated."""
         await self._socket.prepare(request)
         client = self.client
         reason: ShapechangerError | None = None
@@ -384,7 +384,7 @@ class Session:
             while not self._credit:
                 self.client.updated.clear()
                 await self.client.updated.wait()
-            # A time in steps is advanced by the lease holder, or any client without a holder.
+            # If time moves in steps, the lease holder advances it; without one, any client does.
             can_step = hub.holder in (None, self.client)
             advances = can_step if hub.in_steps else self._pace == "lockstep"
             if advances:
@@ -408,8 +408,8 @@ class Session:
         if self._by_frames and hub.frame is not None:
             self._due_s = now_s + _FRAME_PACE * self._period_s
         else:
-            # Counted from the due time, so that delays do not add up, but without a burst after a
-            # long silence of the client.
+            # Count from the due time, so that delays do not add up. After a long silence of the
+            # client, count from now, to avoid a burst of observations.
             was_s = self._due_s if now_s - self._due_s < self._period_s else now_s
             self._due_s = was_s + self._period_s
 
@@ -441,8 +441,8 @@ def _tune(transport: asyncio.Transport | None) -> None:
     """Disable delays, limit buffers, and detect when the other end has disconnected."""
     if transport is None:
         raise LinkError("The connection ended.")
-    # Not 0: asyncio's TLS would then report an empty buffer as full every second time, so that a
-    # message would only count as sent when the next one is.
+    # With 0, asyncio's TLS would report an empty buffer as full every second time, and a message
+    # would only count as sent when the next message is sent.
     transport.set_write_buffer_limits(high=1, low=0)
     accepted = transport.get_extra_info("socket")
     accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
