@@ -1,8 +1,8 @@
 """The twin's board, a separate process: pins, chips, ledger, world and time.
 
-It is started before the robot and outlives the robot's processes, like hardware. It ends on
-SIGTERM, or with the process at the other end of its owner's descriptor. Its arguments are that
-descriptor and its `BoardSettings`.
+It is started before the robot and outlives the robot's processes, like hardware. Its arguments are
+a descriptor that its owner has opened, and its `BoardSettings`. It ends on SIGTERM, or when the
+process at the other end of the descriptor ends.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
 """Interval of checks for a reader of the images while time stands still."""
 _LATER: Final = object()
-"""Result of a function that the board answers later, or never."""
+"""Result of a function to whose caller the board replies later, or never."""
 
 _log = logging.getLogger(__name__)
 _decode_call: Callable[[bytes], Call] = msgspec.msgpack.Decoder(Call).decode
@@ -49,11 +49,11 @@ class _OwnerGone(Exception):
 
 
 def _served(function: Callable[..., object]) -> Callable[[BoardConnection, msgspec.Raw], object]:
-    """Return a function that takes its caller and its encoded arguments."""
+    """Return a function that decodes its arguments, and calls `function` with them."""
     hints = get_type_hints(function)
     hints.pop("return", None)
     takes_caller = hints.pop("caller", None) is not None
-    # The function itself refuses values outside a `Literal`, and suggests the nearest one.
+    # A `Literal` is decoded as str, because `function` itself refuses others with a suggestion.
     kinds = [str if get_origin(hint) is Literal else hint for hint in hints.values()]
     decode: Any = msgspec.msgpack.Decoder(tuple[*kinds]).decode
 
@@ -65,11 +65,11 @@ def _served(function: Callable[..., object]) -> Callable[[BoardConnection, msgsp
 
 
 class Board:
-    """Executes the calls of clients; time is CLOCK_MONOTONIC, and a step of the world 10 ms.
+    """Executes the calls of clients. Time is CLOCK_MONOTONIC; the world has steps of 10 ms.
 
-    A parameter `caller` of a called function gets the connection. It may raise a
-    `ShapechangerError`, or an `OSError` with its `errno`. `owner_fd` gets a byte once the board
-    listens, and is readable once its owner has ended.
+    A called function with a parameter `caller` gets the connection. Functions may raise a
+    `ShapechangerError`, or an `OSError` with an `errno`. The board writes a byte to `owner_fd` once
+    it listens; `owner_fd` is readable once the owner has ended.
     """
 
     def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
@@ -99,7 +99,7 @@ class Board:
         own = (self.greet, self.leave, self.wait, self.sleep)
         functions = (*own, *self._pins.functions, *operator_functions(self._pins))
         self._functions = {one.__name__: _served(one) for one in functions}
-        # Clients, keyed by descriptor, in the order in which they connected.
+        # Connections of clients, keyed by descriptor, in the order in which they connected.
         self._connections: dict[int, BoardConnection] = {}
         self._owner_fd = owner_fd
         self._listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -113,7 +113,7 @@ class Board:
 
     def run(self) -> None:
         """Serve clients and advance time until an error."""
-        run_early()  # Raise the priority, because hardware is not delayed by a busy machine.
+        run_early()  # Raise the priority, because a busy machine would not delay real hardware.
         step_ns = self.now_ns()
         while True:
             due_ns = step_ns if self._camera is None else min(step_ns, self._camera.next_ns)
@@ -135,7 +135,7 @@ class Board:
         caller.has_left = True
 
     def wait(self, caller: BoardConnection, until_ns: int) -> object:
-        """Reply once the client's inputs have edges."""
+        """Reply once an input of the client has an edge; `until_ns` has no effect in real time."""
         caller.waits = caller.call_id
         caller.wake(self.now_ns(), always=False)
         return _LATER
@@ -154,7 +154,7 @@ class Board:
             raise _OwnerGone
         for connection in [one for fd, one in self._connections.items() if fd in ready]:
             self._execute_all(connection)
-        # Accepted last, so that the end of a process is handled before its successor.
+        # Accept last, so that the end of a process is handled before its successor connects.
         if self._listening.fileno() in ready:
             connected, _ = self._listening.accept()
             self._connections[connected.fileno()] = BoardConnection(connected)
@@ -194,8 +194,8 @@ class Board:
         function = self._functions.get(call.function)
         if function is None:
             raise RobotError(f"The board has no function {call.function!r}.")
-        # An operator acts after everything that processes have sent until now, and the owner of a
-        # pin may have ended before another process claims it.
+        # A call of an operator takes effect after all calls that the robot's processes have sent
+        # before. Before a claim, the end of the pin's previous owner must be handled.
         if connection.role == "operator" or call.function == "claim":
             for other in [*self._connections.values()]:
                 if other.role == "hardware":
@@ -214,19 +214,19 @@ class Board:
 
 
 class TwinTimeBoard(Board):
-    """A board whose time advances only while a client sleeps, and waits for all that take part.
+    """A board whose time advances only while a client sleeps and all participants wait.
 
-    A client takes part from its first `wait`. Its wait ends at each tick of the guard, and at its
-    own `until_ns`.
+    A client is a participant from its first `wait`. A wait ends at the next tick of the guard, or
+    at the client's `until_ns` if that is earlier.
     """
 
     def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
         self._now_ns = START_NS
         self._ticks = 0
-        # Ends of sleeps, ordered by time and then by arrival: time, number, caller and call.
+        # A tuple for each sleep: its end, ns, its number, the caller, and the id of its call.
         self._sleepers: list[tuple[int, int, BoardConnection, int | None]] = []
         self._sleeps = 0
-        self._wanted_ns: dict[BoardConnection, int] = {}  # Next end of each participant's wait.
+        self._wanted_ns: dict[BoardConnection, int] = {}  # Each participant's last `until_ns`.
         super().__init__(settings, owner_fd)
 
     def now_ns(self) -> int:
@@ -234,7 +234,7 @@ class TwinTimeBoard(Board):
         return self._now_ns
 
     def wait(self, caller: BoardConnection, until_ns: int) -> object:
-        """Let a client, which takes part from now on, wait until its next tick."""
+        """Make a client a participant, and let it wait until the next tick or `until_ns`."""
         self._wanted_ns[caller] = until_ns
         caller.waits = caller.call_id
         return _LATER
@@ -288,7 +288,9 @@ class TwinTimeBoard(Board):
 if __name__ == "__main__":
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # Ctrl-C stops the robot, which the board outlives.
     given = msgspec.json.decode(sys.argv[2], type=BoardSettings)
     with suppress(_OwnerGone):
         (Board if given.clock == "real" else TwinTimeBoard)(given, int(sys.argv[1])).run()

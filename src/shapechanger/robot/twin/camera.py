@@ -20,9 +20,9 @@ from shapechanger.robot.cameras.jpeg import with_capture_time
 from shapechanger.robot.cameras.sources import draw_barcode
 
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
-"""Faults of a camera: no images, the same one again, noise, or half an image; "" for none."""
+"""Faults of a camera: no images, repeats of one image, noise, or half images; "" for none."""
 
-_PIPE_BYTES: Final = 1 << 20  # The most that Linux gives without privileges.
+_PIPE_BYTES: Final = 1 << 20  # The largest size of a pipe that Linux allows without privileges.
 _FIONREAD: Final = 0x541B
 
 
@@ -35,8 +35,8 @@ class FrontCameraPipe:
     world: World
     start_ns: int  # Time of the first image.
     _: KW_ONLY
-    # Whether to drop an image while the one before is unread. Otherwise images are dropped only if
-    # the pipe is full or has no reader.
+    # Whether to drop an image while the previous image is unread. If False, images are dropped only
+    # if the pipe is full or has no reader.
     latest_only: bool
     barcode: bool = True  # Whether the first rows of an image show its capture time.
 
@@ -52,7 +52,7 @@ class FrontCameraPipe:
         self._fault = ""
 
     def take(self, now_ns: int) -> None:
-        """Take the image that is due, and skip those whose time has passed."""
+        """Take the image that is due, and skip earlier images that were not taken."""
         while self.next_ns <= now_ns:
             self._taken += 1
             self.next_ns = self.start_ns + round(self._taken * 1e9 / self.plan.fps)
@@ -69,13 +69,13 @@ class FrontCameraPipe:
                 self._write(self._last, self._last_ns)
 
     def break_down(self, fault: CameraFault | str) -> None:
-        """Make the camera fail; "" repairs it."""
+        """Cause a fault of the camera; "" repairs it."""
         if fault not in (faults := get_args(CameraFault)):
             raise UnknownName("fault of a camera", fault, faults)
         self._fault = fault
 
     def draw(self, now_ns: int) -> bytes:
-        """Return the current image as JPEG, with its time in a comment and maybe a barcode."""
+        """Return the current image as JPEG, with its time in a comment and, if set, a barcode."""
         picture = np.ascontiguousarray(self.world.picture())
         if self.barcode:
             draw_barcode(picture, now_ns)
@@ -90,7 +90,7 @@ class FrontCameraPipe:
             self._rest = b""
 
     def find_reader(self) -> bool:
-        """Open the pipe if a reader waits for that; return whether it is open."""
+        """Open the pipe if it has a reader; return whether it is open."""
         if self._fd is None:
             try:
                 self._fd = os.open(self.path, os.O_WRONLY | os.O_NONBLOCK)
@@ -102,7 +102,7 @@ class FrontCameraPipe:
         return True
 
     def _ready(self) -> bool:
-        """Return whether the reader is ready for an image."""
+        """Return whether an image can be written now."""
         if not self.find_reader():
             return False
         if self._rest:
@@ -112,13 +112,13 @@ class FrontCameraPipe:
         return not any(fcntl.ioctl(self._fd, _FIONREAD, bytes(4)))  # Bytes that wait in the pipe.
 
     def _write(self, data: bytes, captured_ns: int | None) -> None:
-        """Write as much as fits; the rest of an image is written first the next time."""
+        """Write as much as the pipe accepts, and keep the rest for the next `_ready`."""
         if self._fd is None:
             return
         try:
             written = os.write(self._fd, data)
         except BlockingIOError:
-            return  # An image that does not fit at all is dropped; the rest of one is kept.
+            return  # The pipe is full: a new image is dropped, and the rest of an image is kept.
         except BrokenPipeError:
             self.close()
             return

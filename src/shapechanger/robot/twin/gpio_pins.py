@@ -11,7 +11,7 @@ from shapechanger.robot.hardware import Clock
 from shapechanger.robot.twin.rpc import BoardClient
 
 _REVISION: Final = 0xC03115
-"""A Raspberry Pi 4B with 4 GB; its header has the pins of all newer ones."""
+"""Revision code of a Raspberry Pi 4B with 4 GB; all newer models have the same header."""
 
 
 class TwinPin(PiPin):
@@ -26,7 +26,7 @@ class TwinPin(PiPin):
         self._claim("input")
 
     def close(self) -> None:
-        """Leave an output at its level, or low if it had PWM; remove the pull of an input."""
+        """Leave an output at its level, or low if it has PWM; remove the pull of an input."""
         if self._board.closed:
             return
         if self._function == "output":
@@ -35,7 +35,7 @@ class TwinPin(PiPin):
             self.function = "input"
 
     def output_with_state(self, state: bool) -> None:
-        """Become an output at this level; an output changes to it."""
+        """Make the pin an output, and set its level."""
         if self._function != "output":
             self._disable_event_detect()
             self._claim("output", level=int(state))
@@ -62,7 +62,7 @@ class TwinPin(PiPin):
     def _get_state(self) -> float:
         if self._function == "output":
             return self._duty
-        if self._board.clock == "real":  # Twin time stands still between two grants.
+        if self._board.clock == "real":  # In twin time, levels change only at a grant.
             self._board.wait()
         return self._board.levels[self._number]
 

@@ -21,7 +21,7 @@ from shapechanger.robot.twin.rpc import (
 
 
 class SteadyClock(Clock):
-    """The machine's monotonic clock; edges of inputs are dispatched while the guard waits."""
+    """The machine's monotonic clock; its `wait` dispatches edges of inputs."""
 
     is_real: ClassVar = False
 
@@ -58,7 +58,7 @@ class SteadyClock(Clock):
 class GrantedClock(SteadyClock):
     """The twin's own clock, which the board advances.
 
-    A process that calls `wait` takes part: time advances only while all participants wait.
+    A process that calls `wait` becomes a participant; time advances only while all of them wait.
     """
 
     def __init__(self, client: BoardClient, path: str) -> None:
@@ -70,17 +70,14 @@ class GrantedClock(SteadyClock):
         return self._client.now_ns
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Finish the last grant and wait for the next; see `Clock.wait`.
-
-        A grant arrives at each tick of the board, and at `until_ns` if that is earlier.
-        """
+        """Wait until the board advances time to the next tick or `until_ns`; see `Clock.wait`."""
         granted = self._client.wait(until_ns, at_most_s)
         self._client.dispatch()
         return granted
 
     async def sleep(self, seconds: float) -> int | None:
         """Let twin time advance, and return when the newest image was taken."""
-        import asyncio  # Only the daemon sleeps; the guard stays light.
+        import asyncio  # Only the daemon sleeps, and the guard must not load asyncio.
 
         loop = asyncio.get_running_loop()
         with (
@@ -105,7 +102,7 @@ class TwinBus:
         self._bus = bus
 
     def write_byte(self, i2c_addr: int, value: int) -> None:
-        """Send one byte: on the bus, it is a register without data."""
+        """Send one byte, which is a register without data."""
         self.write_i2c_block_data(i2c_addr, value, [])
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
@@ -123,7 +120,7 @@ class TwinBus:
 
 
 class TwinServoPort:
-    """Port of the servo bus; see `ServoPort`. Its servos answer at once or not at all."""
+    """Port of the servo bus; see `ServoPort`. Its servos reply at once or never."""
 
     def __init__(self, board: BoardClient, device: str) -> None:
         self._board = board

@@ -10,7 +10,7 @@ pin     pin, duty, hz, pid       an output: its level (hz 0), or the duty of its
 pulse   pin, us, hz, pid         servo pulses; 0 us for none
 i2c     bus, address, register, data, pid      bytes written to a chip
         bus, address, channel, us, hz          the resulting pulses of a PWM channel
-gone    pid                      a process died; the next lines are the levels of its pins
+gone    pid                      a process died; the next lines have the levels of its pins
 input   pin, level               an edge of a sensor
 place   seed                     the operator placed the vehicle at a start
 put_back                         the operator put the vehicle back after a collision
@@ -20,13 +20,12 @@ fault   detail                   the operator broke or pressed something
 
 Each line is written at once, so that a crash leaves at most one broken line, the last.
 
-The wiring computes the value of each output from the levels of pins and pulses: the chip of each
-output inverts its driver. Its plan is the served plan by default, and may differ: if two pins are
-swapped only in the served profile, the wrong motor turns.
+`TwinWiring` computes the value of each output from the levels of pins and pulses, which is the
+inverse of the output's driver. Its plan may differ from the served plan: if two pins are swapped
+only in the served profile, the wrong motor turns.
 
-The ledger alone decides whether a robot moved without permission. The inputs are the ledger, the
-wiring and the times at which the robot was permitted to move, but nothing from the robot's own
-programs.
+Whether a robot moved without permission is decided from the ledger, the wiring and the times at
+which the robot was permitted to move, without data from the robot's own programs.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ from shapechanger.robot.drivers.simulation import Levels, Pulse, PwmChannel, Wir
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One line of the ledger, see the module; None for fields that its kind does not have.
+    """One line of the ledger, see the module. Fields that its kind does not have are None.
 
     `pid` is the process that made the change, `pin` a BCM number, `duty` a share of the time from 0
     to 1, `hz` a frequency in Hz, and `us` the width of pulses in microseconds.
@@ -75,7 +74,7 @@ class Transition:
 def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
     """Read all complete lines of a ledger, ordered by time.
 
-    Processes stamp their changes, so lines of two processes may be out of order in the file.
+    Each process sets the times of its changes, so the file may have lines out of order.
     """
     decode = msgspec.json.Decoder(Transition).decode
     transitions: list[Transition] = []
@@ -110,11 +109,11 @@ def _apply(levels: Levels, transition: Transition) -> None:
 
 
 ONE_SHOT_MS: Final = 100.0
-"""Time for which the one-shot of the enable line keeps the motors' power on after an edge."""
+"""Time, ms, for which the enable line's one-shot keeps the motors' power on after an edge."""
 
 
 class TwinWiring:
-    """Wiring of a robot, whose one-shot, if any, holds the power for `one_shot_ms` after edges."""
+    """Wiring of a robot; a one-shot, if any, keeps the power on for `one_shot_ms` after an edge."""
 
     def __init__(self, plan: GuardPlan, one_shot_ms: float | None = ONE_SHOT_MS) -> None:
         self.plan = plan
@@ -133,8 +132,8 @@ class TwinWiring:
     def idle_level(self, pin: int) -> int:
         """Return the level of an undriven pin.
 
-        The hardware guide asks for pull-downs on all outputs, and for a pull-up on the output
-        enable of a PCA9685, which is active low.
+        The hardware guide requires pull-downs on all outputs, and a pull-up on the output enable of
+        a PCA9685, which is active low.
         """
         return int(pin in self._high)
 
@@ -143,14 +142,14 @@ class TwinWiring:
         return pin in self._high or pin in self._low
 
     def power_ends_ns(self, levels: Levels) -> int | None:
-        """Return when the one-shot cuts the motors' power, ns; None without a one-shot."""
+        """Return the time at which the one-shot cuts the motors' power, ns; None without it."""
         if self._one_shot_ns is None or self.plan.enable_pin is None:
             return None
         edge_ns = levels.edges_ns.get(self.plan.enable_pin)
         return 0 if edge_ns is None else edge_ns + self._one_shot_ns
 
     def has_power(self, levels: Levels, now_ns: int) -> bool:
-        """Return whether the one-shot, if there is one, leaves the motors their power."""
+        """Return whether the motors have power, which a one-shot may have cut."""
         ends_ns = self.power_ends_ns(levels)
         return ends_ns is None or now_ns < ends_ns
 
@@ -183,10 +182,10 @@ class Interval(NamedTuple):
 
 
 def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval]:
-    """Return when each propelling output was not at rest.
+    """Return the intervals in which a propelling output was not at rest.
 
-    A pin with PWM counts with its duty. The last levels remain, unless the one-shot of the enable
-    line cuts the power.
+    The value of a pin with PWM is its duty. After the last line, the levels remain, but the
+    one-shot of the enable line may still cut the power.
     """
     found: list[Interval] = []
     running: dict[str, Interval] = {}
@@ -207,10 +206,10 @@ def unauthorised(
     wiring: TwinWiring,
     permitted: Iterable[tuple[float, float]],
 ) -> list[Interval]:
-    """Return when a propelling output was not at rest without permission.
+    """Return the intervals in which a propelling output was not at rest without permission.
 
-    `permitted` has the start and end of each time in which it may move, ns, such as from the
-    arrival of a command to its deadline. The `ledger` is ordered by time.
+    `permitted` has the start and end, ns, of each interval in which the robot may move, for example
+    from the arrival of a command to its deadline. The `ledger` must be ordered by time.
     """
     never = (math.inf, math.inf)
     permits = [*sorted(permitted), never]
@@ -226,10 +225,9 @@ def unauthorised(
 
 
 def time_to_rest(ledger: Iterable[Transition], wiring: TwinWiring, fault_ns: int) -> float:
-    """Return the time from a fault until all propelling outputs are at rest for good.
+    """Return the time, s, from a fault until all propelling outputs are permanently at rest.
 
-    Returns:
-        Seconds; 0 if they were at rest before and stayed so, infinite if one never comes to rest.
+    It is 0 if they stayed at rest from the fault on, and infinite if one never comes to rest.
     """
     ends = [interval.end_ns for interval in propelled(ledger, wiring)]
     return max(0.0, max(ends, default=0.0) - fault_ns) / 1e9

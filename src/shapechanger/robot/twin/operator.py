@@ -25,11 +25,11 @@ class Whereabouts(NamedTuple):
     """True state of the vehicle.
 
     Attributes:
-        x: Position, m.
-        y: Position, m.
+        x: Position along the x axis, m.
+        y: Position along the y axis, m.
         heading: Angle from the x axis, rad, counter-clockwise seen from above.
         speed: Speed along the heading, m/s.
-        travelled_m: Distance rolled by the wheels, m; driving backward counts down.
+        travelled_m: Distance rolled by the wheels, m; it decreases while driving backward.
         bumped: Whether the bumper is pressed.
         distance_m: Free distance ahead of the nose, m.
         truth: Quantities that no sensor measures, such as the progress along a course, keyed by
@@ -51,7 +51,7 @@ class Whereabouts(NamedTuple):
 def _at_board(
     function: Callable[Concatenate[Operator, _P], _R],
 ) -> Callable[Concatenate[Operator, _P], _R]:
-    """Decorate a method so that its body runs in the board's process, with `_board`."""
+    """Decorate a method so that its body runs in the board's process, where `_board` is set."""
 
     @functools.wraps(function)
     def ask(self: Operator, *args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -67,13 +67,13 @@ def _at_board(
 class Operator:
     """A person next to the robot, who moves the vehicle, causes faults and presses buttons.
 
-    Each request takes effect after everything that the robot's processes sent before it.
+    Each request takes effect after all calls that the robot's processes have sent before it.
 
     Args:
         path: Socket on which the board listens.
 
     Raises:
-        RobotError: If no board listens there.
+        RobotError: If no board listens on that socket.
     """
 
     _client: BoardClient
@@ -118,15 +118,15 @@ class Operator:
     def lay_out(self, seed: int) -> None:
         """Replace the surroundings, and place the vehicle at a start in them.
 
-        On a course in MuJoCo, this delays the board by some tenths of a second, as does the first
-        `put_back` on it. Starting a twin with another seed has no such delay.
+        On a course in MuJoCo, this delays the board by some tenths of a second, and so does the
+        first `put_back` on the course. Starting a twin with another seed has no such delay.
         """
         self._board.world.lay_out(seed)
         self._board.record("course", seed=seed)
 
     @_at_board
     def break_camera(self, fault: CameraFault) -> None:
-        """Make the camera fail; "" repairs it."""
+        """Cause a fault of the camera; "" repairs it."""
         if self._board.camera is None:
             raise RobotError("This twin has no camera.")
         self._board.camera.break_down(fault)
@@ -147,21 +147,21 @@ class Operator:
 
     @_at_board
     def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
-        """Override the readings of distance sensors, m; None for true ones; `dead` for none."""
+        """Override the readings of distance sensors, m; None for true ones, `dead` for no echo."""
         for sensor in self._board.of_kind(SimulatedHcsr04):
             sensor.override_m, sensor.dead = metres, dead
         self._board.record("fault", detail=f"distance {'dead' if dead else metres}")
 
     @_at_board
     def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
-        """Make the I2C chip at an address of a bus stop answering, or answer again."""
+        """Make an I2C chip stop replying, or, with `dead` false, reply again."""
         chips = self._board.dead_chips
         (chips.add if dead else chips.discard)((bus, address))
         self._board.record("fault", detail=f"chip {bus} {address} {'dead' if dead else 'well'}")
 
     @_at_board
     def break_servo(self, tendon: str, fault: ServoFault) -> None:
-        """Make the servo of a tendon fail; "" repairs what can be repaired."""
+        """Cause a fault of a tendon's servo; "" repairs faults that can be repaired."""
         self._board.require_rig().break_servo(tendon, fault)
         self._board.record("fault", detail=f"servo {tendon} {fault or 'well'}")
 

@@ -1,6 +1,6 @@
-"""Pins, chips, sensors and servos of the board, with the world that moves them.
+"""Pins, chips, sensors and servos of the board, and the world that they move and measure.
 
-Levels of outputs outlive the process that has set them.
+Outputs keep their levels after the process that has set them has ended.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.rpc import BoardConnection
 
-# Longest step of the servos' time: after a longer delay of the board by a busy machine, their
-# watchdogs would release them although the guard is not silent.
+# Longest step of the servos' time. A busy machine may delay the board for longer; without this
+# limit, the servos' watchdogs would then release them although the guard is not silent.
 _MAX_SERVO_STEP_NS: Final = 40_000_000
 
 _Sensor = TypeVar("_Sensor", bound=SimulatedSensor)
@@ -41,7 +41,7 @@ _Sensor = TypeVar("_Sensor", bound=SimulatedSensor)
 
 @dataclass(slots=True)
 class _Claim:
-    """A pin that a process holds, or held until it ended."""
+    """State of a pin that a process has claimed; it is kept after the process has ended."""
 
     owner: BoardConnection | None = None
     mode: Literal["input", "output"] = "input"
@@ -52,8 +52,8 @@ class _Claim:
 class PinBoard:
     """Pins, chips, servos and world, for a robot's processes and its operator.
 
-    The `ledger` gets the changes of outputs, unbuffered; None keeps none. The `seed` selects the
-    phase of software PWM, and `clock` returns the time, ns.
+    Changes of outputs are written to the `ledger`, unless it is None. The `seed` selects the phase
+    of software PWM, and `clock` returns the time, ns.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class PinBoard:
         self._chips: dict[tuple[int, int], SimulatedChip] = {}
         for output in plan.outputs:
             if over := output.settings.get("over"):
-                # Channels of one board share it.
+                # Several outputs may be channels of one chip, which is simulated once.
                 self._chips = {**PULSES[over].chips(output), **self._chips}
         for sensor in self._sensors:
             self._chips.update(sensor.chips)
@@ -104,13 +104,13 @@ class PinBoard:
             self._update_channels(at, chip)
 
     def record(self, kind: str, t: int | None = None, **fields: Any) -> None:
-        """Write a line of the ledger, with the time `t`, or the present time."""
+        """Write a line of the ledger with the time `t`, ns, or the present time."""
         if self._ledger is not None:
             line = {"t": self.clock() if t is None else t, "kind": kind, **fields}
             self._ledger.write(json.dumps(line, allow_nan=False).encode() + b"\n")
 
     def advance(self, now_ns: int) -> list[Edge]:
-        """Advance the world to a time, and return and record the edges of inputs on the way."""
+        """Advance the world to a time; record and return the edges of inputs until then."""
         start_ns = self._now_ns
         if now_ns > start_ns:
             if self._rig is not None:
@@ -145,16 +145,16 @@ class PinBoard:
         return self._rig
 
     def reader(self, pin: int) -> BoardConnection | None:
-        """Return the owner of an input; None for other pins."""
+        """Return the process that has claimed a pin as an input, or None."""
         claim = self._claims.get(pin)
         return claim.owner if claim is not None and claim.mode == "input" else None
 
     @property
     def functions(self) -> tuple[Callable[..., object], ...]:
-        """Functions of a robot's processes.
+        """Functions that a robot's processes may call.
 
-        They raise RobotError if another process holds the pin, or this one has not claimed it, and
-        OSError with the `errno` of the kernel's driver if no chip answers.
+        They raise RobotError if the caller has not claimed the pin, or another process holds it,
+        and OSError with the `errno` of the kernel's driver if no chip replies.
         """
         chips = (self.read_chip, self.write_chip, self.read_servos, self.write_servos)
         return (self.claim, self.drive, self.pulse, *chips)
@@ -167,7 +167,7 @@ class PinBoard:
         pull: str,
         level: int,
     ) -> int:
-        """Claim a pin, and return its level, which sensors, pulls and resistors set for inputs."""
+        """Claim a pin and return its level. Sensors, pulls and resistors set that of an input."""
         claim = self._claims.setdefault(pin, _Claim())
         if claim.owner is not None and claim.owner is not caller:
             raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
@@ -222,9 +222,9 @@ class PinBoard:
         return self.require_rig(device).write(data, at)
 
     def free(self, caller: BoardConnection, died: bool) -> None:
-        """Free the pins of a process that has ended, or `died` without closing them.
+        """Free the pins of a process that has ended; `died` is true if it has not closed them.
 
-        Outputs keep their level of that moment.
+        Outputs keep the level that they have at that moment.
         """
         if died:
             self.record("gone", t=caller.t, pid=caller.pid)
@@ -242,7 +242,7 @@ class PinBoard:
             self._drive(caller, pin, duty)
 
     def _parts(self) -> dict[str, float | None]:
-        """Return the value of each part of the vehicle; the mean of outputs that share a part."""
+        """Return the value of each part of the vehicle: the mean of the outputs that move it."""
         values: dict[str, list[float]] = {}
         for name, (value, _) in self._wiring.read(self.levels, self._now_ns).items():
             shares = values.setdefault(self._wiring.outputs[name].part, [])

@@ -32,17 +32,17 @@ _LOG: Final = 2000  # Length of the end of a log in error notes, characters.
 
 
 class RunningRobot:
-    """A robot that is served by processes on this machine, until `close`.
+    """A robot that is served by processes on this machine until `close`.
 
     Args:
         temporary: Whether `close` removes the folder.
 
     Attributes:
-        folder: Folder of its files: the twin's ledger and socket, the key and the log.
-        supervisor: Process of its supervisor.
+        folder: Folder of the robot's files: the twin's ledger and socket, the key and the log.
+        supervisor: Process of the robot's supervisor.
 
     Raises:
-        RobotError: If it does not start.
+        RobotError: If the robot does not start.
     """
 
     def __init__(
@@ -57,14 +57,14 @@ class RunningRobot:
         return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
-        """Close the robot, and add the end of its log to a `LinkError`, as a note."""
+        """Close the robot; add the end of its log to a `LinkError` as a note."""
         if isinstance(error, LinkError):
             error.add_note(f"The log of the robot ends:\n{self.log_text()[-_LOG:]}")
         self.close()
 
     @property
     def port(self) -> int:
-        """Port on 127.0.0.1; while the daemon restarts, wait for its new one."""
+        """Port on 127.0.0.1; while the daemon restarts, wait until its new port is known."""
         return int(self.await_restart()["port"])
 
     @property
@@ -74,27 +74,27 @@ class RunningRobot:
 
     @property
     def known(self) -> KnownRobot:
-        """Address and credentials."""
+        """Address and credentials of the robot."""
         return self.known_at(f"127.0.0.1:{self.port}")
 
     def known_at(self, address: str) -> KnownRobot:
-        """Return the credentials with another address, such as a proxy's."""
+        """Return the credentials with another address, such as the address of a proxy."""
         key = (self.folder / "credentials" / "key").read_text().strip()
         return KnownRobot("robot", address, key, self.await_restart()["fingerprint"] or "insecure")
 
     def client(self, **options: Any) -> RobotClient:
-        """Connect to it, with the options of `RobotClient.connect`."""
+        """Connect to the robot, with options of `RobotClient.connect`."""
         return RobotClient.connect(self.known, **options)
 
     def operator(self) -> Operator:
-        """Connect an operator to its twin."""
+        """Connect an operator to the robot's twin."""
         return Operator(BoardAt(self.folder).socket_path)
 
     def pid_of(self, program: Literal["guard", "daemon"]) -> int:
         """Return the process id of a program of the robot.
 
         Raises:
-            RobotError: If it does not run at the moment.
+            RobotError: If the program does not run at the moment.
         """
         parent = self.supervisor.pid
         children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
@@ -105,7 +105,7 @@ class RunningRobot:
         raise RobotError(f"The robot's {program} does not run at the moment.")
 
     def log_text(self) -> str:
-        """Return the log of its processes so far."""
+        """Return the log of the robot's processes so far."""
         path = self.folder / "log.txt"
         return path.read_text(errors="replace") if path.exists() else ""
 
@@ -113,10 +113,10 @@ class RunningRobot:
         """Wait until the daemon can be reached, also after a restart.
 
         Returns:
-            Its "port" and the "fingerprint" of its certificate.
+            The "port" of the daemon, and the "fingerprint" of its certificate.
 
         Raises:
-            RobotError: If it does not start in time.
+            RobotError: If the daemon does not start in time.
         """
         path = self.folder / _READY
         until_s = time.monotonic() + _READY_S
@@ -134,7 +134,7 @@ class RunningRobot:
         (self.folder / _READY).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """End its processes, with its outputs at rest."""
+        """End the robot's processes, with its outputs at rest."""
         self._end()
         if self._temporary:
             # The board may still write the last lines of its ledger.
@@ -161,13 +161,14 @@ def run_robot(
     Args:
         profile: Profile of the robot, or its file.
         twin: Whether to serve it on its twin.
-        clock: Clock of a twin: the machine's, or one that only clients advance.
+        clock: Clock of a twin: the machine's clock ("real"), or one that only clients advance.
         seed: Seed of a twin's world.
-        folder: Folder for its files; None for a temporary one. A twin that runs there is used.
-        arguments: Further arguments of `serve`.
+        folder: Folder for the robot's files; None for a temporary folder. If a twin's board already
+            runs there, it is used.
+        arguments: Further arguments of `shapechanger robot serve`.
 
     Raises:
-        RobotError: If it does not start.
+        RobotError: If the robot does not start.
     """
     if not isinstance(profile, Profile):
         profile = load_profile(profile)
@@ -187,9 +188,10 @@ def run_robot(
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
-            # So that Ctrl-C first reaches the driving program, which then ends the robot.
+            # Ctrl-C must reach only the driving program, which then ends the robot.
             process_group=0,
-            # A robot must not run on because a terminal was closed. The setting survives `exec`.
+            # The robot must end with this process, for example if its terminal is closed. The
+            # setting survives `exec`.
             preexec_fn=lambda: ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM),
         )
     return RunningRobot(folder, supervisor, temporary=temporary)

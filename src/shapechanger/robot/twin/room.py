@@ -1,7 +1,7 @@
-"""A rectangular room that needs no simulator, for robots without a world, and their motion in it.
+"""A rectangular room that needs no simulator, and the motion of vehicles in it.
 
-It is enough to test a robot's programs: vehicles move, turn, hit walls and see them. Its constants
-are typical of toys of 20 to 30 cm; they were not measured.
+It is sufficient to test a robot's programs: vehicles move, turn, and hit and see walls. The
+constants are typical of toys of 20 to 30 cm; they were not measured.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from numpy.typing import NDArray
 from shapechanger.contract.world import RESTING_V, Pose, Readings, World
 from shapechanger.errors import RobotError
 
-ROOM_LENGTH: Final = 6.0  # m, along x from 0
-ROOM_WIDTH: Final = 4.0  # m, along y from 0
-RADIUS: Final = 0.13  # m, of the disc around the vehicle's middle that must not touch a wall
-_START_CLEARANCE: Final = 0.45  # m that are free around a start
-_START_AHEAD: Final = 1.4  # m that are free ahead of it
+ROOM_LENGTH: Final = 6.0  # Size of the room along x, from 0, m.
+ROOM_WIDTH: Final = 4.0  # Size of the room along y, from 0, m.
+RADIUS: Final = 0.13  # Radius of a vehicle, a disc that cannot enter a wall, m.
+_START_CLEARANCE: Final = 0.45  # Least distance of a start from each wall, m.
+_START_AHEAD: Final = 1.4  # Least free distance ahead of a start, m.
 _LOOK_AHEAD: Final = np.radians(np.array((-15.0, 0.0, 15.0)))
 _CONE: Final = np.radians(np.array((-7.0, 0.0, 7.0)))  # The beam of an HC-SR04 is 15 degrees wide.
 
 DEAD_BAND: Final = 0.04
-"""Size of a value below which friction holds a motor."""
+"""Magnitude of a motor's value below which friction keeps it from turning."""
 
 CAR_SPEED: Final = 1.5
 """Speed of a car at full throttle, m/s."""
 
 _STEERING_LAG_S: Final = 0.08
-_CONTACT: Final = 0.004  # m: something this near presses the bumper
-_BUMPER: Final = np.radians(np.arange(-75.0, 76.0, 7.5))  # Reach of the front bumper.
+_CONTACT: Final = 0.004  # Distance at which a wall presses the bumper, m.
+_BUMPER: Final = np.radians(np.arange(-75.0, 76.0, 7.5))  # Bearings that the bumper covers, rad.
 _LONGEST_STEP_S: Final = 0.01
-_SAG_V: Final = 0.36  # Loss of the battery with a motor at full value.
+_SAG_V: Final = 0.36  # Drop of the battery's voltage with one motor at full value, V.
 
-_FIELD_OF_VIEW: Final = math.radians(90.0)  # From left to right, if no profile states another.
-_CAMERA_HEIGHT: Final = 0.12  # m above the floor
-_WALL_HEIGHT: Final = 0.4  # m
-_STRIPE: Final = 0.25  # m: width of the stripes on walls
-_FADE: Final = 4.0  # m at which a wall has lost 63 % of its light
+_FIELD_OF_VIEW: Final = math.radians(90.0)  # Horizontal default, rad.
+_CAMERA_HEIGHT: Final = 0.12  # Height of the camera above the floor, m.
+_WALL_HEIGHT: Final = 0.4  # Height of the walls, m.
+_STRIPE: Final = 0.25  # Width of the stripes on the walls, m.
+_FADE: Final = 4.0  # Distance at which a wall has lost 63 % of its light, m.
 _CEILING: Final = np.array((185, 189, 194), np.uint8)
 _FLOOR: Final = np.array((90, 71, 52), np.uint8)
 _WALLS: Final = np.array(((220, 70, 60), (70, 150, 220), (235, 190, 60), (90, 180, 90)), np.float32)
@@ -54,7 +54,7 @@ class _Drive(NamedTuple):
     turn: Mapping[str, float] = {}  # Rate of turn for a value of 1, rad/s, counter-clockwise.
     rudder: str = ""  # Part that steers; "" if only the sides do.
     curvature: float = 0.0  # Turn to the right for each metre at full rudder, rad/m.
-    lag_s: float = 0.15  # Time in which the motion covers 63 % of a difference.
+    lag_s: float = 0.15  # Time constant of the speed, s.
 
 
 _Floats = NDArray[np.float64]
@@ -80,8 +80,8 @@ _DRIVES: Final = (
 class DrivingWorld(World):
     """A vehicle in the room; see `World`.
 
-    The robot's outputs move `parts`, such as "wheels", which belong to one kind of vehicle. The
-    `seed` selects the stripes on the walls, and the first start.
+    `parts` are the parts that the robot's outputs move, such as "wheels"; they must belong to one
+    kind of vehicle. The `seed` selects the stripes on the walls and the first start.
     """
 
     def __init__(
@@ -89,8 +89,8 @@ class DrivingWorld(World):
         parts: Collection[str],
         size: tuple[int, int],  # Width and height of the frames, pixels.
         seed: int,
-        pitch_deg: float | None = None,  # Camera's axis below the horizon; None for level.
-        fovy_deg: float | None = None,  # Vertical field of view; None for 90 degrees across.
+        pitch_deg: float | None = None,  # Angle of the camera below the horizon; None for 0.
+        fovy_deg: float | None = None,  # Vertical; None for 90 degrees horizontally.
     ) -> None:
         kinds = [one for one in _DRIVES if {*one.ahead, one.rudder} & set(parts)]
         if len(kinds) > 1:
@@ -102,11 +102,11 @@ class DrivingWorld(World):
         self.place(seed)
 
     def truth(self) -> dict[str, float]:
-        """Return no quantities."""
+        """Return an empty dictionary, because the room has no further quantities."""
         return {}
 
     def place(self, seed: int) -> None:
-        """Put the vehicle at a start with free space around and more of it ahead, at rest."""
+        """Put the vehicle at rest at a random start with free space around it and ahead."""
         self._seed = seed
         rng = random.Random(f"start {seed}")
         free = 0.0
@@ -119,7 +119,7 @@ class DrivingWorld(World):
         self._acceleration = self._load = 0.0
 
     def put_back(self) -> None:
-        """Return the vehicle to its start, as the room has no lane."""
+        """Return the vehicle to its start, because the room has no lane."""
         self.place(self._seed)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
@@ -142,7 +142,7 @@ class DrivingWorld(World):
         )
 
     def distance_m(self) -> float:
-        """Return the shortest of three rays from the nose."""
+        """Return the shortest distance along three rays from the nose, m."""
         return max(0.0, float(self._cast(_CONE)[0].min()) - RADIUS)
 
     def picture(self) -> NDArray[np.uint8]:
@@ -157,9 +157,9 @@ class DrivingWorld(World):
         return np.where(below < _CAMERA_HEIGHT - _WALL_HEIGHT, _CEILING, picture)
 
     def _aim(self, size: tuple[int, int], pitch: float, fovy_deg: float | None) -> None:
-        """Set the bearing of each column, rad, and the downward slope of each pixel's line.
+        """Set the bearing of each column, rad, and the downward slope of each pixel's ray.
 
-        All lines of a column have the bearing of its middle, even in a pitched camera.
+        All pixels of a column have the bearing of its middle, also if the camera is pitched.
         """
         width, height = size
         across = width if fovy_deg is None else height
@@ -176,7 +176,8 @@ class DrivingWorld(World):
         """Cast rays from the vehicle to the walls.
 
         Returns:
-            Distance, m, number of the wall, 0 to 3, and place along it, m, of each ray.
+            For each ray, the distance, m, the number of the wall, 0 to 3, and the position along
+            the wall, m.
         """
         cos, sin = np.cos(self._heading + bearings), np.sin(self._heading + bearings)
         with np.errstate(divide="ignore"):
@@ -219,6 +220,6 @@ def _lagged(value: float, target: float, lag_s: float, dt_s: float) -> float:
 
 
 def _free_share(place: float, move: float, length: float) -> float:
-    """Return the share of a move along an axis before a wall, 0 to 1."""
+    """Return the share of a move along an axis that is possible before a wall, 0 to 1."""
     limit = length - RADIUS if move > 0.0 else RADIUS
     return 1.0 if move == 0.0 else min(1.0, max(0.0, (limit - place) / move))

@@ -2,7 +2,7 @@
 
 A client sends `Call`s and the board replies to them: one MessagePack object per datagram, over a
 Unix socket of type `SOCK_SEQPACKET`, which keeps datagrams separate and in order. Arguments are
-decoded by the types of the called function. Times are nanoseconds of the run's clock.
+decoded by the types of the called function. Times are nanoseconds of the twin's clock.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Role = Literal["hardware", "operator", "clock"]
 """A robot's process, a person next to the robot, or a connection that only sleeps."""
 
 _GONE: Final = "The twin's board has ended."
-_HELD_UP_S: Final = 0.01  # Time between two calls while the board does not reply.
-_PATIENCE_S: Final = 10.0  # A board that does not reply for longer is broken.
-_MAX_EDGES: Final = 500  # Kept for a client that does not wait for them, before they are merged.
+_HELD_UP_S: Final = 0.01  # Interval of `while_held_up` while the board does not reply, s.
+_PATIENCE_S: Final = 10.0  # Time limit for a reply of the board, s.
+_MAX_EDGES: Final = 500  # Number of edges to queue for a client that does not wait for them.
 
 _Result = TypeVar("_Result")
 
@@ -38,8 +38,8 @@ _Result = TypeVar("_Result")
 class Call(msgspec.Struct, frozen=True, omit_defaults=True):
     """A call of a function of the board, with encoded arguments.
 
-    Without an `id` the client waits for no `Reply`, and the board only logs failures. A board with
-    a twin's clock uses its own time, not `t`, the time of the call in nanoseconds.
+    Without an `id`, the client waits for no `Reply`, and the board only logs failures. `t` is the
+    time of the call, ns; a board with a twin's clock ignores it and uses its own time.
     """
 
     function: str
@@ -49,14 +49,14 @@ class Call(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Reply(msgspec.Struct, frozen=True, omit_defaults=True):
-    """End of a call: an encoded result, or an error message or `errno`."""
+    """Reply to a call: an encoded result, an error message, or an `errno`."""
 
     id: int
     result: msgspec.Raw = msgspec.Raw(b"\xc0")  # None.
     error: str | int = ""
 
     def decode(self, kind: Any) -> Any:
-        """Return the result, of a type, or raise the error of the call."""
+        """Return the result, decoded as the type `kind`, or raise the error of the call."""
         if isinstance(self.error, int):
             raise OSError(self.error, os.strerror(self.error))
         if self.error:
@@ -65,27 +65,27 @@ class Reply(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Greeting(NamedTuple):
-    """Result of "greet": the kind of clock, and its time."""
+    """Result of "greet": the kind of clock, and its time, ns."""
 
     clock: Literal["real", "twin"]
     t: int
 
 
 class Slept(NamedTuple):
-    """Result of "sleep": the time, and when the newest frame was taken, if any was."""
+    """Result of "sleep": the time, and the capture time of the newest frame or None, ns."""
 
     t: int
     captured_ns: int | None
 
 
 class Awake(NamedTuple):
-    """Result of "wait": the time, and the edges of the client's inputs since the last one."""
+    """Result of "wait": the time, ns, and the edges of the client's inputs since the last wait."""
 
     t: int
     edges: list[Edge]
 
 
-# Keys of chips have pins of the class `Pin`, a subclass of int.
+# Settings of chips may have pins of the class `Pin`, a subclass of int.
 encode: Callable[[object], bytes] = msgspec.msgpack.Encoder(enc_hook=int).encode
 
 
@@ -95,7 +95,7 @@ def encode_call(function: str, *arguments: object, id: int | None = None) -> byt
 
 
 def decode_reply(data: bytes) -> Reply:
-    """Return a reply; raise RobotError for the end of a connection."""
+    """Decode a reply; raise RobotError if `data` is empty, the end of a connection."""
     if not data:
         raise RobotError(_GONE)
     return msgspec.msgpack.decode(data, type=Reply)
@@ -115,9 +115,9 @@ class BoardClient:
         self._replies: dict[int, Reply] = {}
         self._edges: deque[Edge] = deque()
         self.levels: dict[int, int] = {}  # Levels of the pins that are claimed as inputs.
-        # Functions that `dispatch` calls with level and time of each edge, keyed by pin.
+        # Functions that `dispatch` calls with the level and the time of an edge, keyed by pin.
         self.watchers: dict[int, Callable[[int, int], None]] = {}
-        # Called every 10 ms while the board neither takes a request nor replies to it.
+        # Called every 10 ms while a request cannot be sent, or the board does not reply to it.
         self.while_held_up: Callable[[], object] = lambda: None
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ExitStack() as undo:
@@ -158,7 +158,8 @@ class BoardClient:
         """Wait until the board reports edges, or advances twin time to the next tick or `until_ns`.
 
         Returns:
-            Whether it did within `at_most_s` of real time, which updates `now_ns` and `levels`.
+            True after a report, which updates `now_ns` and `levels`; False after `at_most_s`
+            seconds of real time.
         """
         self._waits = self._waits or self._call("wait", until_ns)
         poll = select.poll()
@@ -199,7 +200,7 @@ class BoardClient:
         self._replies[reply.id] = reply
 
     def _await(self, transfer: Callable[[], _Result], until_s: float) -> _Result:
-        """Wait for the board, which a busy machine or a new world may hold up."""
+        """Repeat a transfer until it succeeds; a busy machine or a new world may delay it."""
         while True:
             with translate_errors(OSError, to=board_gone), suppress(TimeoutError):
                 return transfer()
@@ -208,9 +209,9 @@ class BoardClient:
 
 
 class BoardConnection:
-    """The board's end of the connection to a client, which never blocks.
+    """The board's end of the connection to a client; it never blocks.
 
-    Two connections of one process are two callers.
+    A process with two connections counts as two clients.
     """
 
     def __init__(self, connected: socket.socket) -> None:
@@ -219,10 +220,10 @@ class BoardConnection:
         self.role: Role = "clock"
         self.pid = 0  # Process at the other end.
         self.call_id: int | None = None  # Id of the executed call, if it expects a reply.
-        self.t = 0  # Time of that call, ns.
-        self.waits: int | None = None  # Id of its "wait" without a reply; None while it runs.
-        self.executes = False  # Whether its calls are being executed.
-        self.has_left = False  # Whether it has announced its end.
+        self.t = 0  # Time of the executed call, ns.
+        self.waits: int | None = None  # Id of a "wait" of the client without a reply, or None.
+        self.executes = False  # Whether calls of the client are being executed.
+        self.has_left = False  # Whether the client has announced its end.
         self._edges: list[Edge] = []
 
     @property
@@ -231,7 +232,7 @@ class BoardConnection:
         return self.socket.fileno() < 0
 
     def receive(self) -> bytes | None:
-        """Return the next message; b"" from a client that has ended, None without a message."""
+        """Return the next message; b"" if the client has ended, None if no message has arrived."""
         try:
             return self.socket.recv(MAX_MESSAGE)
         except BlockingIOError:
@@ -240,7 +241,7 @@ class BoardConnection:
             return b""
 
     def reply(self, call_id: int | None, result: object = None, error: str | int = "") -> None:
-        """Send the end of a call, whose result msgspec can encode, if the client waits for it."""
+        """Send the result or the error of a call; without `call_id`, no client waits for it."""
         if call_id is not None:
             with suppress(OSError):  # If the client has disconnected, `receive` reports it.
                 self.socket.send(encode(Reply(call_id, msgspec.Raw(encode(result)), error)))
@@ -248,15 +249,15 @@ class BoardConnection:
     def add_edge(self, edge: Edge) -> None:
         """Queue an edge of the client's inputs, in order of time, until the client waits.
 
-        A client that does not wait for them loses edges, as in the kernel: beyond 500, only the
-        last edge of each input is kept.
+        If more than 500 edges are queued, only the last edge of each input is kept. The kernel also
+        drops edges that are not read.
         """
         self._edges.append(edge)
         if len(self._edges) > _MAX_EDGES:
             self._edges = sorted({edge.pin: edge for edge in self._edges}.values())
 
     def wake(self, now_ns: int, *, always: bool) -> None:
-        """End the client's "wait" if there are edges, or in any case if `always`."""
+        """End the client's "wait" if edges are queued, or, if `always`, in any case."""
         if self.waits is not None and (self._edges or always):
             waits, edges = self.waits, self._edges
             self.waits, self._edges = None, []

@@ -26,7 +26,7 @@ from shapechanger.robot.twin.rpc import BoardClient
 
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
-_MAX_SOCKET_PATH: Final = 100  # Bytes; Linux takes 107.
+_MAX_SOCKET_PATH: Final = 100  # Longest path of a socket, bytes; the limit of Linux is 107.
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +35,8 @@ class Place:
 
     Attributes:
         opener: Function that opens the world, as "module:function"; "" for the plain room, which
-            needs no simulator. It is called as `open_world`, without the place.
-        arguments: Keyword arguments of the opener, as JSON values.
+            needs no simulator. It is called with the arguments of `open_world` except `place`.
+        arguments: Further keyword arguments of the opener, JSON values.
     """
 
     opener: str = ""
@@ -44,7 +44,7 @@ class Place:
 
 
 def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, seed: int) -> World:
-    """Open the world of a place, for a robot whose outputs move `parts`.
+    """Open the world of a place for a robot whose outputs move `parts`.
 
     The `seed` selects the surroundings and the start.
 
@@ -78,7 +78,7 @@ class BoardAt:
 
     @property
     def socket_path(self) -> str:
-        """Socket on which it listens."""
+        """Socket on which the board listens."""
         return str(self.folder / "board.socket")
 
     @property
@@ -88,12 +88,12 @@ class BoardAt:
 
     @property
     def fifo_path(self) -> Path:
-        """Pipe of its images; it exists only with a camera."""
+        """Pipe of the camera's images; it exists only with a camera."""
         return self.folder / "camera.mjpeg"
 
     @property
     def hardware(self) -> tuple[str, str]:
-        """Source of the hardware of a robot's processes, with its argument."""
+        """Function that connects a robot's process to the board, MODULE:NAME, and its argument."""
         return "shapechanger.robot.twin.hardware:connect", self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
@@ -108,7 +108,7 @@ class BoardAt:
 
 
 def end(process: subprocess.Popen[bytes], within_s: float) -> None:
-    """Wait for the end of a process, and kill it if it takes longer."""
+    """Wait for the end of a process, and kill it after `within_s` seconds."""
     try:
         process.wait(within_s)
     except subprocess.TimeoutExpired:
@@ -117,7 +117,7 @@ def end(process: subprocess.Popen[bytes], within_s: float) -> None:
 
 
 def find_board(folder: str | os.PathLike[str]) -> tuple[BoardAt, Literal["real", "twin"]] | None:
-    """Return the board that runs in a folder, and its clock; None without one."""
+    """Return the board that runs in a folder, and its clock; None if no board runs there."""
     board = BoardAt(Path(folder).absolute())
     with suppress(RobotError), closing(BoardClient(board.socket_path, "operator")) as client:
         return board, client.clock
@@ -139,18 +139,19 @@ def start_board(
     Args:
         wiring: Plan with the simulated wiring.
         clock: The machine's clock ("real"), or one that only clients advance ("twin").
-        folder: Existing folder for its socket, ledger and pipe, without such files.
-        camera: Front camera; None without one.
-        seed: Seed of the room, the first start and everything random.
-        one_shot_ms: Hold time of the enable line's one-shot, ms; None without one.
+        folder: Existing folder for socket, ledger and pipe; it must not have files of another
+            board.
+        camera: Front camera; None without a camera.
+        seed: Seed of the surroundings, the first start and everything random.
+        one_shot_ms: Hold time of the enable line's one-shot, ms; None without a one-shot.
         place: Place of the vehicle; None for the plain room.
 
     Raises:
-        RobotError: If it does not start, the folder cannot be used, or the seed is not a whole
-            number from 0 to 2^32 - 1.
+        RobotError: If the board does not start, the folder cannot be used, or the seed is not a
+            whole number from 0 to 2^32 - 1.
     """
     seed = check_seed(seed, RobotError)
-    TwinWiring(wiring, one_shot_ms)  # Raises for a robot that the twin does not know.
+    TwinWiring(wiring, one_shot_ms)  # Refuse a robot that cannot be simulated.
     at = BoardAt(Path(folder).absolute())
     if len(os.fsencode(at.socket_path)) > _MAX_SOCKET_PATH:
         raise RobotError(f"The path {at.socket_path} is too long for a socket.")
@@ -174,7 +175,7 @@ def start_board(
             start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
         )
     try:
-        with ours:  # The board ends when this is closed.
+        with ours:  # The board ends when `ours` is closed.
             ready, _, _ = select.select([ours], [], [], _READY_S)
             if not ready or not ours.recv(1):
                 raise RobotError("The twin's board did not start; its output gives the reason.")
