@@ -238,7 +238,7 @@ def test_a_policy_is_corrected(tmp_path: Path, demos: Cli) -> None:
         (["Car", "--corrected-by", "me"], "corrected by expert"),
         (["Car", "--options", '{"colour": 3}'], "colour"),
         (["Car", "--seed", "-1"], "A seed is"),
-        (["Ant", "--put-back"], "are for vehicles"),
+        (["Ant", "--put-back"], "need a vehicle's env"),
     ],
 )
 def test_invalid_arguments_give_one_sentence(

@@ -61,7 +61,7 @@ def test_a_mark_at_the_height_of_the_lens_is_enough(
         ("test-car.toml", "--picture wall.jpg --board 7x5", "no checkerboard of 7 x 5"),
         ("test-car.toml", "--picture wall.jpg --board 7x5 --horizon 3", "not both"),
         ("test-car.toml", "--picture wall.jpg --horizon 50", "--fovy"),
-        ("test-car.toml", "--picture wall.jpg --fovy 0", "10 to 170, got 0"),
+        ("test-car.toml", "--picture wall.jpg --fovy 0", "must be 10 to 170 degrees, got 0"),
         ("test-car.toml", "--picture wall.jpg --fovy 48.8", "give --board or --horizon"),
         ("test-car.toml", "--picture wall.jpg --horizon 121 --fovy 48.8", "from 0 to 120"),
         ("test-car.toml", "--picture wall.jpg", "does not state pitch_deg and fovy_deg"),

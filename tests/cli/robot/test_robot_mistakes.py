@@ -83,14 +83,14 @@ MISTAKES = (
     ("serve test-car.toml --twin --twin-folder stale", "A twin has left"),
     ("serve test-car.toml --twin --policy nowhere", "There is no policy file or folder"),
     ("serve test-car.toml --twin --port 0 --world coridor", "Did you mean 'corridor'?"),
-    ("serve test-car.toml --twin --port 0 --world room --lens dirt", "choose a --world for"),
+    ("serve test-car.toml --twin --port 0 --world room --lens dirt", "choose another --world"),
     ("serve test-car.toml --twin --port 0 --lens nihgt", "Did you mean 'night'?"),
     ("serve cat --twin --port 0 --world corridor", "there is no cat in MuJoCo"),
     ("serve car --twin --port 0 --world harbour", "A car does not float"),
     ("serve lab-boat --twin --port 0 --world yard", "A boat floats: it cannot drive in a yard"),
     ("serve finger --twin --port 0 --finger-seed 3", "--finger-seed needs --gap"),
     ("serve finger --twin --port 0 --gap real-lik", "Did you mean 'real-like'?"),
-    ("serve finger --twin --port 0 --gap wide --world room", "give only one of them"),
+    ("serve finger --twin --port 0 --gap wide --world room", "Give --gap or --world, not both"),
     ("serve test-car.toml --twin --port 0 --gap wide", "A --gap is between fingers"),
     ("serve test-car.toml --twin --seed -1", "A seed is a whole number from 0 to"),
     (f"serve finger --twin --gap wide --finger-seed {2**32}", "A seed is a whole number"),
@@ -125,7 +125,7 @@ MISTAKES = (
     ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),
     ("remember one 127.0.0.1:99999 --fingerprint insecure", "a port from 1 to 65535"),
     ("remember ../one 127.0.0.1 --fingerprint insecure", "robot's name has up to 64"),
-    ("find --seconds 0", "more than 0 s"),
+    ("find --seconds 0", "must be above 0 and at most 60"),
 )
 
 

@@ -5,7 +5,7 @@ import { displayName, formatSigned } from "./layout.js";
 import { Pilot } from "./pilot.js";
 import { place } from "./stick.js";
 
-const UNMOVED_LOOKS = 10; // Observations in a row.
+const UNMOVED_LOOKS = 10; // Observations without an effect after which a hint is shown.
 
 export class Actions {
   #pilot;
@@ -50,7 +50,7 @@ export class Actions {
     this.#mark(this.#wantedDot, wanted);
   }
 
-  /** Explain a command that moves nothing without a refusal, as below a threshold. */
+  /** Show a hint if a command has no effect and no refusal, for example below a threshold. */
   #hint({ mine, armed, stop_reason: reason, commanded, action_applied: applied }) {
     const isQuiet = mine && armed && !reason;
     let hint = "";

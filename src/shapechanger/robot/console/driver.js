@@ -1,12 +1,12 @@
-// Driving: one answer to each observation, and stops at once.
+// Driving: answers each observation once, and sends stops at once.
 
 import { letterAt } from "./letters.js";
 
 const TAKEN_WITHIN_MS = 2_000; // Time in which a waiting program takes control.
 const LEASE_MS = 2_000;
 const ARMED_MS = 2_000; // Time in which an order to arm has an effect.
-const PAUSE_MS = 1_000; // A held input does not count after a longer pause.
-const LEAST_MS = 15; // Between extra commands while the stick moves.
+const PAUSE_MS = 1_000; // After a longer pause of the robot, a held input does not count.
+const LEAST_MS = 15; // Least time between extra commands while the stick moves.
 
 /** Fires `note` (detail: a sentence) when a request failed. */
 export class Driver extends EventTarget {
@@ -25,7 +25,7 @@ export class Driver extends EventTarget {
   /** True if this page has control. */
   mine = false;
 
-  /** Speed cap, 0.1 to 1, as a share of what the robot allows. */
+  /** Speed cap, 0.1 to 1, as a share of the robot's full range. */
   scale = 0.5;
 
   constructor(link, pilot) {
@@ -67,7 +67,7 @@ export class Driver extends EventTarget {
       this.#pilot.letGo();
       this.#note("The robot sent nothing for a while: let go, and press again to drive on.");
     }
-    // What was held while somebody else armed the robot is no order to drive.
+    // An input that was held while another person armed the robot must not drive it.
     if (isArmed(observation) && !wasArmed) {
       if (nowMs - this.#armMs > ARMED_MS) this.#pilot.letGo();
       this.#armMs = -Infinity;
@@ -95,7 +95,7 @@ export class Driver extends EventTarget {
     }
   }
 
-  /** Stop the robot, without control too. */
+  /** Stop the robot, even without control of it. */
   stop(reason) {
     this.#pilot.letGo();
     this.#link.send("emergencystop", { reason });
@@ -154,13 +154,13 @@ export class Driver extends EventTarget {
     this.#note("No program waits for control: start one, and try again while its reset waits.");
   }
 
-  /** Release everything that is held; it must be let go, and used again. */
+  /** Ignore all held inputs until they are let go and used again. */
   letGo() {
     this.#pilot.letGo();
     if (this.isDriving) this.#command();
   }
 
-  /** Handle a hidden page: a robot that it drives is disarmed; a program drives on. */
+  /** Handle a hidden page: disarm the robot if this page has control; a program drives on. */
   hide(isHidden) {
     if (isHidden && this.mine) this.disarm();
     if (isHidden) this.#pilot.letGo();

@@ -1,6 +1,6 @@
-// One recorded episode, fetched piece by piece, first around the step that is shown.
+// One recorded episode, which is fetched in pieces, beginning around the step that is shown.
 
-const AT_ONCE = 40; // Lines of a piece, about two seconds.
+const AT_ONCE = 40; // Number of lines in a piece: about two seconds.
 
 export class Episode {
   #lines = [];
@@ -8,10 +8,10 @@ export class Episode {
   #total = null;
   #verdicts = null;
 
-  /** Steps by their number, as far as they were fetched. */
+  /** Fetched steps, indexed by their number. */
   steps = [];
 
-  /** Marks by the number of their step. */
+  /** Marks, keyed by the number of their step. */
   marks = new Map();
 
   constructor(id, actions) {
@@ -19,7 +19,7 @@ export class Episode {
     this.actions = actions; // Names of the actions, until the header has arrived.
   }
 
-  /** Return the next range to fetch, first around a step; null when all is fetched. */
+  /** Return the next range of lines to fetch, nearest to a step; null if all are fetched. */
   missing(place) {
     if (this.#total === null) return { first: 0, count: AT_ONCE };
     const from = (start) => {
@@ -84,7 +84,7 @@ export class Episode {
     return verdicts;
   }
 
-  /** Return the frame of a step as a Blob; null without one, or before it is fetched. */
+  /** Return the frame of a step as a Blob; null if it has none or it is not fetched yet. */
   picture(step) {
     const name = this.steps[step]?.frame?.[0];
     return (name && this.#pictures.get(name)) || null;

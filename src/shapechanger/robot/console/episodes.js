@@ -1,4 +1,4 @@
-// Recordings: shows an episode, and marks a range of it as bad or good again.
+// Recordings: shows an episode, and marks a range of its steps as bad or good.
 
 import { find, label, make, setText } from "./dom.js";
 import { Episode } from "./episode.js";
@@ -185,7 +185,7 @@ export class Episodes {
     if (!isOn) return;
     if (this.#scrub.value === this.#scrub.max) this.#scrub.value = 0;
     this.#timer = setInterval(() => {
-      if (!this.#episode?.steps[this.#scrub.valueAsNumber]) return; // Wait for the pieces under way.
+      if (!this.#episode?.steps[this.#scrub.valueAsNumber]) return; // Wait for the pending pieces.
       if (this.#scrub.value === this.#scrub.max) this.#play(false);
       this.#scrub.value = this.#scrub.valueAsNumber + 1;
       this.#look();
@@ -221,7 +221,7 @@ export class Episodes {
     const [first, last] = this.#range;
     if (!this.#link.send("judge", { episode: id, first, last, keep })) return;
     setText(find("episodes-state"), `Steps ${first} to ${last} are ${keep ? "good again" : "bad"}.`);
-    // The robot appends a line for that, which makes the episode longer.
+    // The robot appends a line to the episode for the new mark.
     this.#link.addEventListener("recordings", () => this.#again(id), { once: true });
   }
 

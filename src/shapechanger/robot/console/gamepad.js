@@ -1,9 +1,9 @@
 // Gamepad: the left stick steers; the triggers or either stick drive.
 
-const DEAD = 0.12; // Dead zone as a share of the travel: sticks do not rest at 0.
+const DEAD = 0.12; // Dead zone as a share of the travel, because sticks do not rest exactly at 0.
 const POLL_MS = 20;
-const ARM = 0; // Of the standard mapping: A.
-const STOP = 1; // B.
+const ARM = 0; // Button A of the standard mapping.
+const STOP = 1; // Button B of the standard mapping.
 
 function withDeadZone(value) {
   const size = Math.abs(value);
@@ -14,9 +14,9 @@ export class Gamepads {
   #changed;
   #pressed;
   #note;
-  #pads = null; // The connected pads, as a text to compare.
+  #pads = null; // Description of the connected pads, to detect changes.
   #mustRest = true;
-  #buttons = null; // Null before the first look at a pad.
+  #buttons = null; // Null before a pad is read for the first time.
   #timer = 0;
 
   /** Steering and throttle, -1 to 1 each. */
@@ -56,7 +56,7 @@ export class Gamepads {
     if (steering !== before.steering || throttle !== before.throttle) this.#changed();
   }
 
-  /** Require rest whenever a pad comes, goes, or changes its place: another one may be read from now on. */
+  /** Require rest whenever the list of pads changes, because another pad may be read from now on. */
   #compare(pads, used) {
     const now = pads.map(({ index, id, mapping }) => `${index} ${mapping} ${id}`).join("\n");
     if (now === this.#pads) return;
@@ -73,16 +73,16 @@ export class Gamepads {
     const [across, left, right] = [0, 1, 3].map((axis) => pad.axes[axis] ?? 0);
     const [backward, forward] = [6, 7].map((button) => pad.buttons[button]?.value ?? 0);
     const inputs = [across, left, right, backward, forward];
-    // Each input by itself: two triggers that rest half-way would cancel each other.
+    // Check each input separately: two triggers that rest half-way would cancel each other.
     if (this.#mustRest) this.#mustRest = !inputs.every((input) => Math.abs(input) < DEAD);
-    // Another window may be played with the pad.
+    // A person may be using the pad in another window.
     if (!document.hasFocus() || !inputs.every(Number.isFinite)) this.letGo();
     if (!this.#mustRest) {
       const ways = [forward - backward, -right, -left].map(withDeadZone);
       const throttle = ways.reduce((most, way) => (Math.abs(way) > Math.abs(most) ? way : most), 0);
       this.value = { steering: withDeadZone(across), throttle };
     }
-    // A new pad's A does not count until it is pressed again: browsers show a pad at its first press.
+    // Browsers report a pad at its first press, so that press of A does not count.
     const now = pad.buttons.map((button) => button.pressed);
     if (now[STOP] && !this.#buttons?.[STOP]) this.#pressed("stop");
     if (now[ARM] && this.#buttons?.[ARM] === false && document.hasFocus()) this.#pressed("arm");

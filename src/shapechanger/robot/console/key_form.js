@@ -1,11 +1,11 @@
-// The form for the key, which may also come from the address or from this tab.
+// The form for the key, which may also be in the page's address or stored in this tab.
 
 import { find, setText } from "./dom.js";
 import { parseKey } from "./proof.js";
 
 const KEPT = "shapechanger-key";
 
-/** Take the key out of the address; "" for none. */
+/** Remove the key from the page's address, and return it; "" for none. */
 export function keyFromAddress() {
   const fields = new URLSearchParams(location.hash.slice(1));
   const key = fields.get("key") ?? "";
@@ -13,12 +13,12 @@ export function keyFromAddress() {
   return key;
 }
 
-/** Return the key that this tab keeps; "" for none. */
+/** Return the key that is stored in this tab; "" for none. */
 export function keptKey() {
   return sessionStorage.getItem(KEPT) ?? "";
 }
 
-/** Keep a key in this tab until it is closed; "" deletes it. */
+/** Store a key in this tab until the tab is closed; "" deletes the stored key. */
 export function keepKey(key) {
   if (key) sessionStorage.setItem(KEPT, key);
   else sessionStorage.removeItem(KEPT);
@@ -33,7 +33,7 @@ export function defaultName() {
 export class KeyForm {
   #key = find("key");
 
-  /** `enter` is called with a key and a name; it may throw an Error to show. */
+  /** `enter` is called with a key and a name. It may throw an Error, whose message is shown. */
   constructor(enter) {
     find("name").value = defaultName();
     find("key-form").addEventListener("submit", (event) => {
@@ -50,7 +50,7 @@ export class KeyForm {
     });
   }
 
-  /** Show the form, with the text of the last attempt, and why the connection ended. */
+  /** Show the form with a key, and the reason why the connection ended. */
   show(key = "", why = "") {
     if (key) this.#key.value = key;
     setText(find("key-trouble"), why);

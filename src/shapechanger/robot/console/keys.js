@@ -1,5 +1,5 @@
-// Keys by their place on the keyboard (`event.code`), whatever the layout writes there. A place has
-// one meaning: a key that drives is never a shortcut.
+// Keys, identified by their position on the keyboard (`event.code`) in any layout. A position has one
+// meaning: a key that drives is never a shortcut.
 
 const DRIVE = "drive";
 const STOP = "stop";
@@ -16,7 +16,7 @@ const MEANINGS = new Map([
   ["Minus", ["lowerCap"]], ["NumpadSubtract", ["lowerCap"]],
 ]);
 
-// Shift has no meaning of its own here.
+// Shift is not included, because it does not change the meaning of a key here.
 const MODIFIERS = new Set(["Meta", "OS", "Super", "Hyper", "Control", "Alt", "AltGraph"]);
 
 export class Keys {
@@ -27,10 +27,10 @@ export class Keys {
   #actions;
 
   /**
-   * `isLive` tells whether keys have a meaning now, and `changed` is called when a driving key goes
-   * down or up. `letGoAll` is called with a modifier: the system takes such combinations, and macOS
-   * sends no keyup of a letter while Meta is held. `actions` has a function for each other meaning;
-   * `stop` takes the reason.
+   * `isLive` returns whether keys have a meaning now. `changed` is called when a driving key goes
+   * down or up. `letGoAll` is called at a combination with a modifier, which the system may use, and
+   * because macOS sends no keyup of a letter while Meta is held. `actions` has a function for each
+   * other meaning; `stop` is called with the reason.
    */
   constructor(isLive, changed, letGoAll, actions) {
     this.#isLive = isLive;
@@ -62,7 +62,7 @@ export class Keys {
     return this.#isLive() && MEANINGS.get(code)?.[0] === STOP && !isText(target);
   }
 
-  /** Stop the robot, with any modifier and with the focus anywhere but in a text field. */
+  /** Stop the robot at a stop key, with any modifier, unless the focus is in a text field. */
   #stop(event) {
     if (!this.#stops(event)) return;
     if (event.code === "Space") {
@@ -83,7 +83,7 @@ export class Keys {
     }
     const [meaning] = MEANINGS.get(code) ?? [STOP];
     if (meaning === STOP || isElsewhere(event)) return;
-    event.preventDefault(); // Do not scroll the page.
+    event.preventDefault(); // Prevents scrolling of the page.
     if (repeat) return;
     if (meaning !== DRIVE) this.#actions[meaning]();
     else if (!this.#held.has(code)) {
@@ -111,9 +111,9 @@ function isModified(event) {
 
 /** Return true if a key belongs to an input method, a dialog or a focused element. */
 function isElsewhere({ code, key, keyCode, isComposing, target }) {
-  if (isComposing || keyCode === 229 || key === "Dead") return true; // 229: an input method has it.
+  if (isComposing || keyCode === 229 || key === "Dead") return true; // 229: of an input method.
   if (isText(target) || target instanceof HTMLSelectElement) return true;
-  // The arrows move a focused slider, and not the robot.
+  // The arrow keys move a focused slider instead of the robot.
   if (code.startsWith("Arrow") && target instanceof HTMLInputElement) return true;
   return document.querySelector("dialog[open]") !== null;
 }

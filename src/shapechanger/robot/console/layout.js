@@ -2,7 +2,7 @@
 
 const UNITS = { 1: "", rad: "rad", "m/s": "m/s", "m/s^2": "m/s²", degC: "°C" };
 
-/** Return each number of a layout: name, unit, low and high (infinite if unbounded). */
+/** Return name, unit, low and high (infinite if unbounded) of each number of a layout. */
 export function features(json) {
   if (!json) return [];
   return JSON.parse(json).features.flatMap((feature) => {
@@ -34,7 +34,7 @@ export function formatSigned(value) {
   return value > 0 && /[1-9]/.test(text) ? `+${text}` : text;
 }
 
-/** Return the difference of two times of one clock, ms; each a Number or a BigInt, ns. */
+/** Return the difference, ms, of two times of one clock, ns, which are Numbers or BigInts. */
 export function msBetween(earlierNs, laterNs) {
   if (typeof earlierNs === "number" && typeof laterNs === "number") return (laterNs - earlierNs) / 1e6;
   return Number(BigInt(laterNs) - BigInt(earlierNs)) / 1e6;

@@ -1,4 +1,4 @@
-// Letters of the person's keyboard, to show for keys that have a meaning by their place.
+// Letters of the person's keyboard, which are shown for the positions of keys.
 
 import { find, setText } from "./dom.js";
 
@@ -6,13 +6,13 @@ let layout = null;
 
 const SIGNS = { Equal: "=", Minus: "-" };
 
-/** Return the letter at a place, such as "Z" for "KeyW" on AZERTY; of QWERTY if it is unknown. */
+/** Return the letter at a position, such as "Z" for "KeyW" on AZERTY; QWERTY by default. */
 export function letterAt(code) {
   const letter = layout?.get(code) ?? SIGNS[code] ?? code.replace(/^Key/, "");
   return letter.length === 1 ? letter.toUpperCase() : letter;
 }
 
-/** Show the keys of an element, or change them; the codes are separated by spaces. */
+/** Show the keys of an element; their codes are separated by spaces. */
 export function showKeys(element, codes = element.dataset.keys) {
   element.dataset.keys = codes;
   const letters = codes.split(" ").map(letterAt);
@@ -21,12 +21,12 @@ export function showKeys(element, codes = element.dataset.keys) {
   if (shown) setText(shown, letters[0]);
 }
 
-/** Show the letters of the present layout, where the browser tells it. */
+/** Show the letters of the present keyboard layout, if the browser reports it. */
 export async function learnLetters() {
   try {
     layout = (await navigator.keyboard?.getLayoutMap?.()) ?? null;
   } catch {
-    return; // The browser may withhold it.
+    return; // The browser may refuse to report the layout.
   }
   for (const element of document.querySelectorAll("[data-keys]")) showKeys(element);
   const drives = ["KeyW", "KeyA", "KeyS", "KeyD"].map(letterAt).join(" ");

@@ -11,9 +11,9 @@ const LONGEST_WAIT_MS = 5_000;
 const PING_MS = 1_000;
 const SILENCE_MS = 6_000; // A longer silence means that the connection is lost.
 const GREETING_MS = 8_000;
-const REMEMBERED = 5; // Round trips.
+const REMEMBERED = 5; // Number of round trips to store.
 
-/** Fetch the description of the robot before authentication; throws if it does not answer. */
+/** Fetch the description of the robot before authentication; throws if the robot does not answer. */
 export async function describeRobot() {
   const answer = await fetch("/console/robot.json", { cache: "no-store" });
   if (!answer.ok) throw new Error(`The robot answered ${answer.status}.`);
@@ -21,10 +21,10 @@ export async function describeRobot() {
 }
 
 /**
- * Fires `state` (detail: {state, text}) with the states connecting, open, waiting, refused and
- * displaced, when another person took this page's place: then it does not reconnect by itself;
- * `invalid` (detail: a sentence) for bytes that are no message; and for each other message of the
- * robot, but for pongs, an event of its type, with the message as detail.
+ * Fires `state` (detail: {state, text}) with the state connecting, open, waiting, refused or
+ * displaced. After "displaced", another person has replaced this page, and it does not reconnect.
+ * Fires `invalid` (detail: a sentence) for bytes that are not a message. For each other message of
+ * the robot except pongs, fires an event named after its type, with the message as detail.
  */
 export class Link extends EventTarget {
   #socket = null;
@@ -117,7 +117,7 @@ export class Link extends EventTarget {
       const was = this.welcome;
       this.#drop();
       if (refused && !was && /key/i.test(refused)) this.#report("refused", refused);
-      // Pages that reconnect at once would displace one another endlessly.
+      // Displaced pages that reconnect at once would displace one another endlessly.
       else if (was && /are the limit/.test(refused)) this.#report("displaced", refused);
       else this.#wait(refused || (was ? "The connection is lost." : "The robot does not answer."));
     };
@@ -175,7 +175,7 @@ export class Link extends EventTarget {
 
   #check() {
     if (performance.now() - this.#heardMs > SILENCE_MS) {
-      // The radio is gone without a sign. The end of the socket may take minutes.
+      // The radio may be out of reach, and the browser may report it only after minutes.
       this.#attempt += 1;
       this.#drop();
       this.#wait("The robot no longer answers.");

@@ -1,9 +1,9 @@
-// Log of events, newest last, for people to read and to hear.
+// Log of events, newest last, which screen readers announce.
 
 import { make } from "./dom.js";
 
 const MOST = 100;
-const AGAIN_MS = 5_000; // The same text within this time is counted, and not repeated.
+const AGAIN_MS = 5_000; // Within this time, repeats of a text are only counted.
 
 export class Log {
   #list;

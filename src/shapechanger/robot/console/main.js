@@ -21,10 +21,10 @@ import { Stick } from "./stick.js";
 import { Tilt } from "./tilt.js";
 
 const CAP_STEP = 10; // %
-const PRESS_MS = 1_000; // The click after a press is the same press.
-const OLD_MS = 500; // An older picture is marked as old.
+const PRESS_MS = 1_000; // A click within this time after a press belongs to the press.
+const OLD_MS = 500; // Age above which a picture is marked as old.
 
-let driver = null; // Depends on the robot's actions, so it is made for each connection.
+let driver = null; // Made for each connection, because it depends on the robot's actions.
 let actions = null;
 let readings = null;
 let key = "";
@@ -132,8 +132,8 @@ link.addEventListener("observation", ({ detail: seen }) => {
   if (!driver) return;
   const nowMs = performance.now();
   driver.observe(seen);
-  showTilt(); // Arming, disarming and stopping switch it off.
-  // A hidden page draws nothing.
+  showTilt(); // Arming, disarming and stopping switch the tilt control off.
+  // A hidden page does not draw pictures.
   if (document.hidden) return;
   if (seen.frame) picture.show(seen.frame, ageOnArrivalMs(seen, link.roundTripMs), nowMs);
   status.show(seen, driver.mine, nowMs);
@@ -215,7 +215,7 @@ find("arm").addEventListener("click", () => {
 });
 find("hand").addEventListener("click", () => {
   if (driver && !driver.mine && driver.seen?.holder) {
-    letGo(); // Only what is used from now on drives.
+    letGo(); // Inputs that are held already must not drive the robot.
     driver.take();
   } else {
     handOver();
@@ -248,13 +248,13 @@ find("leave").addEventListener("click", () => {
   keyForm.show();
 });
 
-// Stops without a press of a button.
+// Events after which held inputs do not count, or the robot stops.
 
-// The end of a press may go to where the focus is now, to a menu or to a drag.
+// After these events, the page may not be notified of the end of a press.
 for (const name of ["blur", "dragstart", "compositionstart"]) addEventListener(name, letGo);
 for (const name of ["focusin", "focusout"]) {
   addEventListener(name, () => {
-    for (const device of [keys, pads, stick]) device.letGo(); // Tilt is on until it is switched off.
+    for (const device of [keys, pads, stick]) device.letGo(); // Tilt control stays on.
     changed();
   });
 }

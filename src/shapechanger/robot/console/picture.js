@@ -1,4 +1,4 @@
-// Live picture: only the newest JPEG. One that arrives during decoding replaces the waiting one.
+// Live picture. A JPEG that arrives while another is decoded waits, and replaces one that waits.
 
 import { msBetween } from "./layout.js";
 
@@ -17,10 +17,10 @@ export class Picture {
   /**
    * Show a picture once it is decoded.
    *
-   * `ageMs` is its age at `atMs` of this page's clock.
+   * `ageMs` is the age of the picture at the time `atMs` of this page's clock.
    */
   show(jpeg, ageMs, atMs) {
-    // A copy, because a view would keep the whole message in memory.
+    // Copy the bytes, because a view would keep the whole message in memory.
     this.#waiting = { blob: new Blob([jpeg], { type: "image/jpeg" }), ageMs, atMs };
     if (!this.#busy) this.#work();
   }
@@ -39,7 +39,7 @@ export class Picture {
     return this.#drawnMs.length / 2;
   }
 
-  /** Clear the picture, as after the connection ended. */
+  /** Clear the picture, for example after the connection has ended. */
   forget() {
     this.#waiting = null;
     this.newest = null;
@@ -57,7 +57,7 @@ export class Picture {
         this.newest = { ageMs, atMs };
         this.#drawnMs.push(performance.now());
       } catch {
-        // An invalid JPEG: the age of the picture shows it.
+        // The JPEG is invalid. The last picture stays, and its age increases.
       }
     }
     this.#busy = false;
@@ -75,9 +75,9 @@ export function draw(canvas, context, bitmap) {
 }
 
 /**
- * Return the age of an observation on arrival, ms: on the robot, plus half a round trip.
+ * Return the age of an observation on arrival, ms: its age when sent plus half a round trip.
  *
- * Clocks of two machines are never subtracted.
+ * Times of two machines are never subtracted, because their clocks differ.
  */
 export function ageOnArrivalMs(observation, roundTripMs) {
   return msBetween(observation.captured_ns, observation.sent_ns) + (roundTripMs ?? 0) / 2;

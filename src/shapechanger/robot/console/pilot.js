@@ -1,4 +1,4 @@
-// Command of the person: the largest value of all devices, and the sliders for other actions.
+// Command of the person: the largest value of all devices, and the values of the sliders.
 
 const BY_STICK = ["steering", "throttle"];
 
@@ -7,7 +7,7 @@ export class Pilot {
   #devices;
   #held = [];
 
-  /** `features` of the action layout; `devices` have a `value` and can `letGo`. */
+  /** `features` are from the action layout; each device has a `value` and a method `letGo`. */
   constructor(features, devices) {
     this.#features = features;
     this.#devices = devices;
@@ -67,7 +67,7 @@ export class Pilot {
     });
   }
 
-  /** Ignore held devices until they are let go, and used again. */
+  /** Ignore held devices until they are let go and used again. */
   letGo() {
     for (const device of this.#devices) device.letGo();
   }

@@ -1,4 +1,4 @@
-// Policies on board: which there are, which one runs, and what it does.
+// Policies on the robot's computer: their names, the one that runs, and its state.
 
 import { find, label, make, setText } from "./dom.js";
 
@@ -14,7 +14,7 @@ export class Policies {
     link.addEventListener("policystate", ({ detail }) => this.#show(detail));
   }
 
-  /** Begin a connection; a robot with policies tells them next. */
+  /** Begin a connection; a robot with policies then sends their names. */
   begin() {
     find("policies").hidden = true;
     this.#state = { names: [], running: "", text: "" };

@@ -1,4 +1,4 @@
-// Stick on the screen for a finger or a mouse, which springs back.
+// Stick on the screen for a finger or a mouse; it returns to the centre when released.
 
 export class Stick {
   #pad;
@@ -23,7 +23,7 @@ export class Stick {
     pad.addEventListener("touchmove", (event) => event.preventDefault(), { passive: false });
   }
 
-  /** Spring back; a held stick must be let go first. */
+  /** Return to the centre; a held stick does not count until it is let go and used again. */
   letGo() {
     this.#pointer = null;
     this.value = { steering: 0, throttle: 0 };

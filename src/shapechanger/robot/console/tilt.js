@@ -11,7 +11,7 @@ export class Tilt {
   /** Steering and throttle, -1 to 1 each. */
   value = { steering: 0, throttle: 0 };
 
-  /** True while it is on. */
+  /** True while tilt control is on. */
   isOn = false;
 
   constructor(changed) {
@@ -23,7 +23,7 @@ export class Tilt {
     return "DeviceOrientationEvent" in globalThis && navigator.maxTouchPoints > 0;
   }
 
-  /** Switch it on, with the user's permission where needed; throws an Error. */
+  /** Switch tilt control on; asks for permission if needed, and throws an Error if denied. */
   async start() {
     const { requestPermission } = DeviceOrientationEvent;
     if (requestPermission && (await requestPermission.call(DeviceOrientationEvent)) !== "granted") {
@@ -34,7 +34,7 @@ export class Tilt {
     addEventListener("deviceorientation", this.#listener);
   }
 
-  /** Switch it off. */
+  /** Switch tilt control off. */
   letGo() {
     removeEventListener("deviceorientation", this.#listener);
     this.isOn = false;

@@ -1,8 +1,8 @@
 """Program that drives at full throttle in a separate process.
 
-It reads the robot's address from standard input, and prints the time of each sent command on a
-line: monotonic, ns. A pilot, which drives as a policy on board does, replaces it for faults of
-policies, and fails at a signal of `FAILURES`.
+It reads the robot's address from standard input, and prints the monotonic time, ns, of each sent
+command on a line. For faults of policies, a pilot replaces this program: it drives like a policy on
+the robot's computer, and fails at a signal of `FAILURES`.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ FAILURES: Final = {
     "is late": signal.SIGUSR2,
     "gives NaN": signal.SIGALRM,
 }
-"""Signal that makes a policy fail, keyed by the kind of failure."""
+"""Signals that make a policy fail, keyed by the kind of failure."""
 
 
 class Driver(subprocess.Popen[bytes]):
     """The driving process; the end of a `with` block kills it.
 
-    It runs this program, or the module `pilot`, which drives as a policy on board does, and needs a
-    person who arms the robot for it.
+    It runs this program, or the module `pilot`, which drives like a policy on the robot's computer
+    and needs a person who arms the robot.
     """
 
     def __init__(self, robot: KnownRobot, *, pilot: str = "") -> None:
         self._folder = TemporaryDirectory(prefix="shapechanger-driver-")
-        # Files and not pipes, which a driver that is never read would fill.
+        # Files are used because a pipe that is not read would fill, and then block the driver.
         files = [Path(self._folder.name, name) for name in ("address", "sent", "log")]
         address, self._sent, self._log = files
         address.write_bytes(msgspec.json.encode(robot))
@@ -51,7 +51,7 @@ class Driver(subprocess.Popen[bytes]):
             super().__init__(command, stdin=asked, stdout=sent, stderr=log)
 
     def __exit__(self, *_: object) -> None:
-        """Kill it."""
+        """Kill the driving process, and remove its files."""
         self.kill()
         self.wait()
         self._folder.cleanup()
@@ -77,13 +77,13 @@ def asked_robot() -> KnownRobot:
 
 
 def print_time() -> None:
-    """Print that a command is about to be sent, so that a kill in between cannot hide it."""
+    """Print the time before a command is sent, so that no sent command can be missing."""
     sys.stdout.write(f"{time.monotonic_ns()}\n")
     sys.stdout.flush()
 
 
 def main() -> None:
-    """Drive until the link or this process ends."""
+    """Drive at full throttle until the link or this process ends."""
     with RobotClient.connect(asked_robot()) as client:
         actions = Layout.from_json(client.welcome.action_layout)
         values = [float(name == "throttle") for name in actions.names]

@@ -1,4 +1,4 @@
-"""Checks that drive a robot by hand: it follows commands, and stops for every reason."""
+"""Checks that drive a robot as a person: it must obey commands, and stop for every reason."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.robot import RunningRobot
 
-# Time from the last command to rest, in addition to the deadline.
+# Tolerance of the time from the last command to rest, in addition to the deadline.
 _SLACK_MS: Final = 50.0
 _DRIVES_S: Final = 1.0
 _PUSH_S: Final = 0.3
@@ -27,12 +27,12 @@ _STANDS_MPS: Final = 0.02
 
 
 def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[Finding]:
-    """Check a robot with its wheels off the ground, driven by a person at a `cap` of 0 to 1.
+    """Check a robot with its wheels off the ground, at a throttle of at most `cap`, 0 to 1.
 
     Each check begins in the state after the previous one.
     """
     propels = [action.propels for action in profile.actions]
-    # Forward only: a tank's steering propels too.
+    # Command only the first action that propels, because a tank's steering propels too.
     first = propels.index(True) if any(propels) else -1
     forward = [float(i == first) for i in range(len(propels))]
 
@@ -51,7 +51,7 @@ def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator
         return seen
 
     def watch(done: Callable[[Observation], bool]) -> Observation | None:
-        """Wait for an observation that satisfies `done`; None on timeout."""
+        """Return the first observation that satisfies `done`, or None after the time limit."""
         until_s = time.monotonic() + _COASTS_S
         while time.monotonic() < until_s:
             if done(seen := client.ask().message):
@@ -66,7 +66,7 @@ def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator
         return at_rest(seen) and not seen.armed
 
     def speed_of(seen: Observation) -> float | None:
-        """Return the measured speed, m/s; None without a sensor."""
+        """Return the measured speed, m/s, or None if no sensor measures it."""
         if seen.sources.get("speed", "absent") in {"absent", "estimated"}:
             return None
         names = Layout.from_json(client.welcome.state_layout).names

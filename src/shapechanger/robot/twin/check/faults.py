@@ -1,4 +1,4 @@
-"""Faults after which a robot must stop: how to cause each, and the promised time to rest."""
+"""Faults after which a robot must stop, with the time within which it must be at rest."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _MOST_BYTES: Final = 65536
 
 
 class BadNetwork:
-    """TCP proxy with faults, from a free port of 127.0.0.1 to another one, until `close`."""
+    """TCP proxy with faults, from a free port of 127.0.0.1 to the robot's `port`."""
 
     def __init__(self, port: int) -> None:
         self.latency_s = 0.0  # Least delay of each byte, s.
         self.slice_bytes = _MOST_BYTES  # Most bytes to forward at once.
-        self.silent = False  # Blocks all data while connections stay open, as when a radio dies.
+        self.silent = False  # Whether to block all data on open connections, like a dead radio.
         self._robot_port = port
-        self._ends: list[asyncio.StreamWriter] = []  # Alternately the driver's and the robot's.
+        self._ends: list[asyncio.StreamWriter] = []  # Writers to driver, robot, driver, robot, …
         self._ended: set[asyncio.StreamWriter] = set()  # Data to these writers are discarded.
         listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = listener.getsockname()[1]
@@ -60,7 +60,7 @@ class BadNetwork:
             self._loop.call_soon_threadsafe(end.transport.abort)
 
     def half_close(self) -> None:
-        """End the direction towards the robot of all connections; the other one goes on."""
+        """End all connections in the direction to the robot, but not in the other direction."""
         for robot in self._ends[1::2]:
             if not robot.is_closing():
                 self._ended.add(robot)
@@ -81,7 +81,7 @@ class BadNetwork:
         try:
             answers, robot = await asyncio.open_connection("127.0.0.1", self._robot_port)
         except OSError:
-            driver.close()  # The same effect as if the robot refused the connection.
+            driver.close()  # To the driver, the robot seems to refuse the connection.
             return
         self._ends += driver, robot
         with suppress(asyncio.CancelledError):
@@ -94,14 +94,14 @@ class BadNetwork:
                 while self.silent:
                     await asyncio.sleep(_POLL_S)
                 for at in range(0, len(data), self.slice_bytes):
-                    # asyncio logs each write to a lost connection.
+                    # asyncio would log each write to a lost connection.
                     if not sink.is_closing() and sink not in self._ended:
                         sink.write(data[at : at + self.slice_bytes])
                 await sink.drain()
 
 
 class NotTried(RobotError):
-    """A fault could not be tried, which may succeed with a new robot."""
+    """A fault could not be caused; a retry with a new robot may succeed."""
 
 
 class Scene(NamedTuple):
@@ -109,9 +109,9 @@ class Scene(NamedTuple):
 
     robot: RunningRobot
     driver: Driver
-    network: BadNetwork  # Between robot and driver.
-    opened: ExitStack  # Closed after the trial.
-    board: Operator | None  # The board of the robot's twin; None on pins.
+    network: BadNetwork  # Proxy between driver and robot.
+    opened: ExitStack  # Resources that are closed after the trial.
+    board: Operator | None  # Operator of the robot's twin; None for a robot on real pins.
 
 
 Make = Callable[[Scene], int | None]
@@ -120,21 +120,21 @@ Make = Callable[[Scene], int | None]
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault, and what the robot promises after it."""
+    """A fault, and the promised reaction of the robot."""
 
     name: str
     make: Make
-    within_ms: float = 20.0  # Promised time to rest after `after`, ms.
-    # How the robot can detect it: at once, by its deadline, or by the age of a frame.
+    within_ms: float = 20.0  # Promised time from the detection to rest, ms.
+    # How the robot detects the fault: at once, by its deadline, or by the age of a frame.
     after: Literal["", "deadline", "camera"] = ""
-    then: Literal["goes on", "starts afresh", "is gone"] = "goes on"  # The robot afterwards.
-    # Required part. The board makes the faults of the first three, and its ledger dates them.
-    needs: Literal["", "camera", "bumper", "button", "one-shot"] = ""
-    harms: bool = True  # It stops the driving. Otherwise the driver is killed, to measure a stop.
-    silences: bool = False  # Later commands of the driver are ignored.
-    guards_late: bool = False  # The guard itself fails, which adds its own promised time.
-    by_policy: bool = False  # A policy drives, as on board, and a person armed the robot for it.
-    on_pins: bool = False  # It is also tried on the pins of a bench with LEDs.
+    # State of the robot after the fault: it still runs, it restarts, or it has ended.
+    then: Literal["goes on", "starts afresh", "is gone"] = "goes on"
+    needs: Literal["", "camera", "bumper", "button", "one-shot"] = ""  # Required part.
+    harms: bool = True  # Whether the fault stops the driving; if not, the driver is killed later.
+    silences: bool = False  # Whether the robot must ignore later commands of the driver.
+    guards_late: bool = False  # Whether the guard fails: it may obey commands `within_ms` longer.
+    by_policy: bool = False  # Whether a policy drives, for which a person has armed the robot.
+    on_pins: bool = False  # Whether to also try the fault on real pins with LEDs.
 
     def limit_ms(self, limits: LimitPlan) -> float:
         """Return the promised time to rest for these limits, ms."""
@@ -142,12 +142,12 @@ class Fault:
         return self.within_ms + waits[self.after]
 
 
-# Longest duration of an instantaneous fault; a longer one means that the machine was paused.
+# Longest time to cause an instantaneous fault; if it takes longer, the machine was paused.
 _AT_ONCE_MS: Final = 5.0
 
 
 def _at_once(act: Callable[[], object]) -> int:
-    """Cause an instantaneous fault and return its time, which is unknown if it took long."""
+    """Cause an instantaneous fault and return its time; raise `NotTried` if it took too long."""
     at_ns = time.monotonic_ns()
     act()
     took_ms = (time.monotonic_ns() - at_ns) / 1e6
@@ -175,7 +175,7 @@ def _kill_both(scene: Scene) -> int:
 
 
 def _on_board(act: Callable[[Operator, Any], None], broken: object, sound: object) -> Make:
-    """Break or press something on the board of a twin until the trial ends."""
+    """Return a function that sets a state of the twin to `broken` until the trial ends."""
 
     def make(scene: Scene) -> None:
         assert scene.board is not None  # Only twins have these faults.
@@ -186,7 +186,7 @@ def _on_board(act: Callable[[Operator, Any], None], broken: object, sound: objec
 
 
 def _by_another(role: Role, act: Callable[[RobotClient], object]) -> Make:
-    """Act over a connection of another client."""
+    """Return a function that calls `act` with another client."""
 
     def make(scene: Scene) -> int:
         with scene.robot.client(role=role, frames=False) as client:
@@ -247,8 +247,8 @@ FAULTS: Final = {
         _by_deadline("network silent", _set_network("silent", True)),
         _by_deadline("network reset", lambda s: _at_once(s.network.reset)),
         _by_deadline("network half closed", lambda s: _at_once(s.network.half_close)),
-        # Answers to an observation of a second ago are refused, so the last command that acts is
-        # one that had arrived already.
+        # Answers to an observation of a second ago are refused, so only commands that have arrived
+        # before the fault take effect.
         _by_deadline("network late by 1 s", _set_network("latency_s", 1.0)),
         _silences(
             "emergency stop by another",
@@ -277,7 +277,7 @@ FAULTS: Final = {
         _guard("guard killed", _to_program("guard", signal.SIGKILL)),
         _guard("guard stopped", _to_program("guard", signal.SIGSTOP), after="deadline"),
         _gone("supervisor killed", lambda s: _at_once(s.robot.supervisor.kill), 100.0),
-        # Only hardware remains then: the one-shot of the enable line, 100 ms, and its tolerance.
+        # Only the one-shot of the enable line can then stop the robot: 100 ms and its tolerance.
         _gone("guard and supervisor killed", _kill_both, 120.0, needs="one-shot", guards_late=True),
     )
 }

@@ -1,4 +1,4 @@
-"""Trials of faults: drive, cause a fault, evaluate the pins; and the levels of a check."""
+"""Trials of faults, which drive, cause a fault and evaluate the pins; and levels of checks."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ _PWM_S: Final = 0.04
 
 
 class Watcher:
-    """Measures the outputs independently of the robot's programs; the base class cannot measure."""
+    """Measures the outputs independently of the robot's programs; this base class cannot."""
 
     def sees(self, lamp: BenchLamp) -> bool | None:
-        """Return whether an LED is lit; None if that is not measured."""
+        """Return whether an LED is lit, or None if it cannot be measured."""
 
     def moves(self) -> bool | None:
-        """Return whether an output that propels is driven now; None if that is not measured."""
+        """Return whether a propelling output is driven now, or None if it cannot be measured."""
 
     def rest_ms(self, at_ns: int) -> float:
-        """Return the time to the last propulsion, ms; infinite if it goes on, NaN if unknown."""
+        """Return the time from `at_ns` to rest, ms; infinite if it still moves, NaN if unknown."""
         del at_ns
         return math.nan
 
@@ -60,7 +60,7 @@ class Watcher:
 
 
 class _BoardWatcher(Watcher):
-    """Reads the levels of a twin; times come from its ledger."""
+    """Reads the levels of a twin."""
 
     def __init__(self, board: BoardAt, wiring: TwinWiring) -> None:
         self._wiring = wiring
@@ -81,7 +81,7 @@ class _BoardWatcher(Watcher):
 
 
 class _ProbeWatcher(Watcher):
-    """Watches a motor's pin through a wire to a free pin, about a millisecond late."""
+    """Watches a motor's pin through a wire to a free pin, with a delay of about a millisecond."""
 
     def __init__(self, probe: int, probed: int, hardware: Hardware) -> None:
         self._probed = probed
@@ -103,7 +103,7 @@ class _ProbeWatcher(Watcher):
         self._hardware.close()
 
     def _changed(self, at_s: float, level: int) -> None:
-        del at_s, level  # The clock of lgpio is undocumented.
+        del at_s, level  # The clock of lgpio's times is undocumented, so use another one.
         self._last_ns = time.monotonic_ns()
 
 
@@ -113,12 +113,12 @@ class Bench:
 
     profile: Profile
     _: KW_ONLY
-    twin: bool = True  # Whether on its twin.
-    one_shot: bool = True  # Whether a twin has the profile's one-shot of the enable line.
+    twin: bool = True  # Whether to check the robot's twin.
+    one_shot: bool = True  # Whether to simulate the one-shot of the enable line, if there is one.
     probe: int | None = None  # Free BCM pin, wired to the pin of the motor that drives forward.
     arguments: tuple[str, ...] = ()  # Further arguments of `serve`.
     pilot: str = ""  # Module of the program that drives as a policy on board; see `Driver`.
-    ask: Ask = lambda _: None  # Asks a person.
+    ask: Ask = lambda _: None  # Function that asks a person.
     restarts: int = field(default=0, init=False)  # Restarts of the robot since it was served.
 
     def __post_init__(self) -> None:
@@ -162,7 +162,7 @@ class Bench:
         return _ProbeWatcher(self.probe, self._probed, Hardware())
 
     def close(self) -> list[str]:
-        """End everything, and put the pins of this machine at rest after any fault.
+        """End robot and board, and put the pins of this machine at rest.
 
         Returns:
             Outputs that could not be put at rest.
@@ -177,7 +177,7 @@ class Bench:
             return make_safe(self.profile, hardware)
 
     def lacks(self, need: str) -> str:
-        """Return why a fault is not tried; "" if the robot has the required part."""
+        """Return why a fault cannot be tried, or "" if the robot has the required part."""
         profile = self.profile
         has = {
             "camera": profile.camera is not None,
@@ -190,12 +190,12 @@ class Bench:
         return "" if has.get(need, True) else f"This robot has no {need}."
 
 
-# A supervisor gives up after five restarts within a minute. The robot would then be at rest, and
-# the trial would wrongly count as a success.
+# Number of restarts after which the robot is replaced. A supervisor gives up after five restarts
+# within a minute; the robot would then be at rest, and a trial would wrongly count as a success.
 _MOST_RESTARTS: Final = 4
-# A busy machine can make a robot restart, or pause while a fault is made.
+# Number of attempts to cause a fault. A busy machine may restart a robot or delay a fault.
 _ATTEMPTS: Final = 10
-# Number of attempts at a trial in which the robot was not moving before the fault.
+# Most trials for each requested one; a trial only counts if the robot moved before the fault.
 _TRIES: Final = 3
 _COMMANDS: Final = 4
 _DRIVES_S: Final = 5.0
@@ -203,7 +203,7 @@ _STARTS_S: Final = 30.0
 # Time after the promised time for which all outputs must stay at rest.
 _STAYS_S: Final = 0.3
 _LOOK_S: Final = 0.01
-# Tolerance beyond the deadline of a command.
+# Tolerance of the deadline of a command, ms.
 _LATE_MS: Final = 20.0
 
 
@@ -211,13 +211,13 @@ _LATE_MS: Final = 20.0
 class TrialResult:
     """Result of one trial."""
 
-    # Time from the fault to permanent rest, ms; infinite for never, NaN if it is not measured.
+    # Time from the fault to permanent rest, ms; infinite for never, NaN if not measured.
     stopped_ms: float
     limit_ms: float  # The promised time, ms.
-    drove: bool  # Whether it was driving at the fault; the trial is void otherwise.
-    # Times of propulsion without a fresh command; empty without a ledger.
+    drove: bool  # Whether the robot drove at the time of the fault; otherwise the trial is void.
+    # Intervals of propulsion without a valid command; empty on real pins.
     unauthorised: tuple[Interval, ...] = ()
-    answer: bool | None = None  # Whether a person saw it drive and stop; None without an answer.
+    answer: bool | None = None  # Whether a person saw the robot drive and stop; None if not asked.
 
     @property
     def kept(self) -> bool:
@@ -226,10 +226,10 @@ class TrialResult:
 
 
 def run_trials(bench: Bench, fault: Fault, trials: int) -> Iterator[TrialResult]:
-    """Drive, cause the fault and judge, until the robot has driven in as many trials as requested.
+    """Drive, cause the fault and evaluate, until the robot has driven in `trials` trials.
 
-    At most three times as many are made. The robot is replaced if it cannot be driven, because a
-    busy machine made it restart, or if the time of its fault is unknown.
+    At most three times as many trials are made. If a busy machine restarts the robot or delays the
+    fault, the trial is repeated with a new robot.
     """
     drove = tried = not_tried = 0
     while drove < trials and tried < _TRIES * trials:
@@ -269,7 +269,7 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
             translate_errors(ShapechangerError, to=lambda error: NotTried(str(error))),
             robot.client(role="person", frames=False, name="trial") as person,
         ):
-            # Clears the state of the last trial: an emergency stop, or being armed.
+            # Arming ends an emergency stop of the last trial; disarming ends its armed state.
             person.take()
             person.arm()
             person.disarm()
@@ -312,9 +312,9 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
 
 
 def _await_drive(watcher: Watcher) -> None:
-    """Wait until it moves; a restored camera may take a while."""
+    """Wait until the robot moves; after a fault of the camera, this may take a while."""
     if watcher.moves() is None:
-        time.sleep(SHOWN_S)  # For a person to see it.
+        time.sleep(SHOWN_S)  # Let a person see the LEDs.
     until_s = time.monotonic() + _DRIVES_S
     while watcher.moves() is False and time.monotonic() < until_s:
         time.sleep(_LOOK_S)
@@ -336,17 +336,17 @@ def _await_rest(watcher: Watcher, limit_ms: float) -> None:
 def _judged(
     bench: Bench, fault: Fault, began_ns: int, at_ns: int, sent: Sequence[int]
 ) -> TrialResult:
-    """Judge a trial on a twin by its ledger."""
+    """Evaluate a trial on a twin from the twin's ledger."""
     profile, ledger = bench.profile, read_ledger(bench.board.ledger_path)
     if fault.needs in {"camera", "bumper", "button"}:
-        # The fault begins with its line in the ledger, or with the edge of a switch. The robot's
-        # time to stop is measured from there.
+        # The time to stop is measured from the fault's line in the ledger, or from the edge of the
+        # switch.
         switches = [one.settings["pins"] for one in profile.sensors if one.driver == "switch"]
         pins = [profile.stop_pin, *(pin for pins in switches for pin in pins)]
         begins = {("fault", None)} if fault.needs == "camera" else {("input", pin) for pin in pins}
         made = (one.t for one in ledger if one.t >= at_ns and (one.kind, one.pin) in begins)
         at_ns = next(made, at_ns)
-    # A fault of the guard itself has a separate promised time.
+    # If the guard itself fails, it may stop later, within the promised time of the fault.
     slack_ms = fault.within_ms if fault.guards_late else _LATE_MS
     obeyed_ns = (profile.limits.deadline_ms + slack_ms) * 1e6
     last_ns = at_ns + _LATE_MS * 1e6 if fault.silences else math.inf
@@ -361,7 +361,7 @@ def _judged(
 
 
 def fault_finding(bench: Bench, fault: Fault, trials: int) -> tuple[Level, str]:
-    """Try a fault as often as asked, and return the level and sentence of its finding."""
+    """Try a fault in `trials` trials, and return the level and the sentence of its finding."""
     if why := bench.lacks("throttle") or bench.lacks(fault.needs):
         return "unknown", why
     try:
@@ -385,7 +385,7 @@ def fault_finding(bench: Bench, fault: Fault, trials: int) -> tuple[Level, str]:
         return judged(good, f"At rest {stopped}; {promised}.{moved}")
     answers = {result.answer for result in results}
     if answers == {None}:
-        how = "Not measured: join the motor's pin to a free pin, and give --probe"
+        how = "Not measured: join the motor's pin to a free pin, and give that pin as --probe"
         return "unknown", f"{how}; {promised}."
     otherwise = "NOT lit, or NOT out afterwards."
     return judged(answers == {True}, "The LEDs were lit, and then out.", otherwise)
@@ -402,7 +402,7 @@ _PARTS: Final[dict[CheckLevel, tuple[str, ...]]] = {
 
 
 def require_level(level: CheckLevel, bench: Bench) -> None:
-    """Refuse a level that a robot cannot have."""
+    """Refuse a level of checks that is impossible for a robot."""
     if level == "leds":
         lamps_of(bench.profile)
     if level == "faults" and bench.lacks("throttle"):
@@ -415,15 +415,16 @@ def check_robot(
 ) -> Iterator[tuple[str, Iterator[Finding]]]:
     """Yield the name of each part of a level with an iterator of its findings.
 
-    A part runs, and asks its questions, as its iterator is read.
+    A part runs, and asks its questions, while its iterator is read.
 
-    Nothing moves in the part "wiring"; all others drive outputs. Each ends at rest. `cap`, 0 to 1,
-    is the largest throttle of "driving", and `trials` the number of trials of each fault.
+    The part "wiring" moves no output; all other parts drive outputs, and put them at rest at the
+    end. `cap`, 0 to 1, is the largest throttle of "driving"; `trials` is the number of trials of
+    each fault.
     """
 
     def light_lamps() -> Iterator[Finding]:
         with closing(bench.watcher()) as watcher:
-            # Longer than two cycles of software PWM at 50 Hz.
+            # A watcher needs two cycles of software PWM at 50 Hz; a person needs longer.
             shown_s = SHOWN_S if type(watcher) is Watcher else _PWM_S
             yield from check_lamps(bench.profile, bench.pins, bench.ask, watcher.sees, shown_s)
 
