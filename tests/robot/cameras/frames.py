@@ -1,4 +1,4 @@
-"""Frames, and the reader of the barcode that the test pattern and a twin's frames carry."""
+"""Frames, and a reader of the barcode in the test pattern and in a twin's frames."""
 
 import binascii
 
@@ -23,7 +23,7 @@ def read_barcode(image: NDArray[np.uint8]) -> int | None:
 
 
 def jpeg_of(value: int = 0, size: tuple[int, int] = (32, 24)) -> bytes:
-    """Return a JPEG of one grey, of a size (width, height)."""
+    """Return a uniformly grey JPEG of a size (width, height)."""
     image = np.full((size[1], size[0], 3), value, np.uint8)
     return simplejpeg.encode_jpeg(image, 80, colorsubsampling="420")
 

@@ -1,4 +1,4 @@
-"""Camera drivers that need no hardware, and fakes for the others."""
+"""Camera drivers; those that need hardware are tested with fakes."""
 
 import ctypes
 import fcntl
@@ -50,8 +50,8 @@ def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
     return text[0]
 
 
-def test_the_pattern_changes_and_carries_its_time() -> None:
-    """The barcode of each frame is its capture time, so any receiver can measure its age."""
+def test_the_pattern_changes_and_contains_its_time() -> None:
+    """The barcode of each frame is its capture time, so that a receiver can measure its age."""
     camera = open_camera(CameraPlan("pattern", fps=100.0))
     frames = [camera.read() for _ in range(3)]
     for frame in frames:
@@ -59,13 +59,13 @@ def test_the_pattern_changes_and_carries_its_time() -> None:
         assert image.shape == (120, 160, 3)
         assert read_barcode(image) == frame.captured_ns % 2**48
     times = [frame.captured_ns for frame in frames]
-    assert times[2] - times[0] >= 19_000_000  # Two periods, less the last one's lateness.
+    assert times[2] - times[0] >= 19_000_000  # Two periods, with a tolerance for a late frame.
     assert len({frame.jpeg for frame in frames}) == 3
     assert _ends_when_closed(camera, camera.read) == "The camera is closed."
 
 
 def test_a_folder_is_read_in_order_and_repeated(tmp_path: Path) -> None:
-    """Images are sorted by name, and other files ignored."""
+    """Images are sorted by name; other files are ignored."""
     for name, value in (("b.jpg", 90), ("a.jpg", 10), ("c.JPEG", 200)):
         (tmp_path / name).write_bytes(jpeg_of(value))
     (tmp_path / "notes.txt").write_text("no picture")
@@ -108,7 +108,7 @@ def test_a_pipe_returns_the_newest_frame_and_its_time(fifo: Path) -> None:
         camera.read()
     writing = threading.Thread(target=fifo.write_bytes, args=(jpeg_of(50),))
     writing.start()
-    assert camera.read().jpeg == jpeg_of(50)  # The next writer.
+    assert camera.read().jpeg == jpeg_of(50)  # This frame is from the next writer.
     writing.join()
     with pytest.raises(RobotError, match="has ended"):
         camera.read()
@@ -122,13 +122,15 @@ def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
     old = simplejpeg.encode_jpeg(noise, 95)
     with fifo.open("wb", buffering=0) as writer:
         fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, 1 << 18)
-        count = 150_000 // len(old)  # Too long for a single read.
+        count = 150_000 // len(old)  # Too many bytes for a single read.
         writer.write(old * count + jpeg_of(90) + jpeg_of(20)[:100])
         assert camera.read().jpeg == jpeg_of(90)
         writer.write(jpeg_of(20)[100:])
         assert camera.read().jpeg == jpeg_of(20)
         writer.write(jpeg_of(30))
-    assert camera.read().jpeg == jpeg_of(30)  # The writer closed, but this frame is new.
+    assert camera.read().jpeg == jpeg_of(
+        30
+    )  # The writer has closed the pipe, but this frame is new.
     with pytest.raises(RobotError, match="has ended"):
         camera.read()
 
@@ -174,7 +176,7 @@ def test_structures_have_the_kernels_sizes() -> None:
         (api.BufferRequest, api.REQUEST_BUFFERS, 20),
     ):
         assert ctypes.sizeof(structure) == (call >> 16) & 0x3FFF == size
-    # As on a 64-bit kernel.
+    # The sizes on a 64-bit kernel.
     assert (api.Buffer.seconds.offset, api.Buffer.memory.offset) == (24, 60)
     assert (api.Buffer.offset.offset, api.Buffer.length.offset) == (64, 72)
     assert api.PixelFormat.width.offset == 8
@@ -193,7 +195,7 @@ def test_a_webcam_returns_the_newest_frame_and_the_kernels_time(tmp_path: Path) 
         (b"torn", 3_000_000, monotonic | api.BUFFER_FLAG_ERROR),
     ]
     assert camera.read() == Frame(jpeg_of(90), 2_000_000)
-    kernel.pictures = [(jpeg_of(20), 5, 0)]  # A driver without a monotonic clock.
+    kernel.pictures = [(jpeg_of(20), 5, 0)]  # A buffer of a driver without a monotonic clock.
     assert camera.read().captured_ns > 1_000_000_000
     camera.close()
     with pytest.raises(RobotError, match="closed"):
@@ -202,7 +204,7 @@ def test_a_webcam_returns_the_newest_frame_and_the_kernels_time(tmp_path: Path) 
 
 @pytest.fixture
 def pi(monkeypatch: pytest.MonkeyPatch) -> Mock:
-    """Fake packages of a Pi camera, and the only camera that they open."""
+    """Fake picamera2 and libcamera packages, with one camera."""
     camera = Mock()
     request = camera.capture_request.return_value
     request.make_array.return_value = np.zeros((24, 32, 3), np.uint8)

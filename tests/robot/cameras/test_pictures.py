@@ -1,4 +1,4 @@
-"""Barcodes, checks and streams of frames, without a camera."""
+"""Barcodes, checks and streams of frames; no camera is needed."""
 
 import operator
 from collections.abc import Iterable
@@ -54,7 +54,7 @@ def test_invalid_jpeg_is_refused(data: bytes) -> None:
 
 
 def test_a_truncated_frame_is_not_rotated() -> None:
-    """Rotating would re-encode it as a valid JPEG with grey blocks."""
+    """A rotation would re-encode the frame as a valid JPEG with grey blocks."""
     jpeg = simplejpeg.encode_jpeg(_picture(), 80, colorsubsampling="420")
     broken = jpeg[: len(jpeg) // 2] + b"\xff\xd9"
     with pytest.raises(RobotError, match="cannot be decoded"):
@@ -86,7 +86,7 @@ def _split(stream: bytes, cuts: Iterable[int] = ()) -> tuple[list[bytes], int]:
 
 
 def _with_thumbnail(jpeg: bytes, thumbnail: bytes) -> bytes:
-    """Put a thumbnail into a frame, in the segment of Exif."""
+    """Insert a thumbnail into a frame, in an Exif segment."""
     size = (len(thumbnail) + 8).to_bytes(2, "big")
     return jpeg[:2] + b"\xff\xe1" + size + b"Exif\0\0" + thumbnail + jpeg[2:]
 
@@ -103,21 +103,21 @@ _BETWEEN = st.binary(max_size=40).filter(lambda data: b"\xff\xd8" not in data)
 @example(between=[b"\xff", b"\xff\xff", b"\xff\xd9", b"--boundary\r\n\r\n"], cuts=set(range(3000)))
 @example(between=[b""] * 4, cuts=set(range(3000)))
 def test_a_stream_yields_its_frames_and_no_others(between: list[bytes], cuts: set[int]) -> None:
-    """Frames are found with any bytes between them, and wherever reads cut the stream."""
+    """Frames are found with any bytes between them, for any sizes of the reads."""
     stream = between[0] + b"".join(map(operator.add, _FRAMES, between[1:]))
     found, skipped = _split(stream, sorted(cut for cut in cuts if cut < len(stream)))
     assert found == _FRAMES
-    # A last FF may begin the next frame.
+    # A final FF is kept, because it may begin the next frame.
     assert skipped == sum(map(len, between)) - between[-1].endswith(b"\xff")
 
 
 @given(frame=st.sampled_from(_FRAMES), data=st.data())
 def test_a_frame_that_is_cut_off_is_skipped(frame: bytes, data: st.DataObject) -> None:
-    """The frames after it are found, once more bytes arrive than a segment may claim."""
+    """Later frames are found once more bytes have arrived than the longest segment has."""
     cut = data.draw(st.integers(0, len(frame) - 1))
     after = [jpeg_of(value) for value in (1, 2)] * 60
     found, _ = _split(frame[:cut] + b"".join(after))
-    # A thumbnail whose frame is cut off looks like a frame, and a segment that is cut off may end
+    # The thumbnail of an incomplete frame looks like a frame, and an incomplete segment may end
     # exactly at the end of the next frame.
     assert [jpeg for jpeg in found if jpeg != jpeg_of(5)] in (after, after[1:])
 

@@ -1,4 +1,4 @@
-"""The console in a browser, and the outputs of its robot."""
+"""The console in a browser, and the outputs of the robot that it drives."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ PHONE_ON_ITS_SIDE: Final[dict[str, Any]] = PHONE | {"viewport": {"width": 844, "
 _DRIVE: Final = (22, 27)
 
 _DEADLINE_MS: Final = 250.0
-# Delay of the guard, ms: one of its ticks, and the one-shot of the enable line.
+# Tolerance of a stop, ms: a tick of the guard, and the time of the enable line's one-shot.
 _SLACK_MS: Final = 60.0
 _PRESSES: Final = 6
 _PRESSED_S: Final = 10.0
-# Errors that Chromium logs for failures that a test provokes.
+# Errors that Chromium logs for failures that tests cause on purpose.
 _PROVOKED: Final = ("net::ERR_", "WebSocket connection to")
 
 
@@ -40,14 +40,14 @@ class Console:
     Args:
         browser: The browser.
         robot: The robot that serves the page.
-        key: Key in the address; None for the robot's, "" for none.
-        script: Script to run before those of the page.
+        key: Key in the page's address; None for the robot's key, "" for none.
+        script: Script to run before the scripts of the page.
         options: Options of the browser's context, such as `PHONE`.
 
     Attributes:
         page: The page.
-        errors: Errors of its scripts and of the browser, such as policy violations.
-        sent: The messages that it sent to the robot.
+        errors: Errors of the page's scripts and of the browser, such as policy violations.
+        sent: The messages that the page has sent to the robot.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Console:
         self.page.locator(f"body{wanted}").wait_for(timeout=1000 * seconds)
 
     def arm(self) -> None:
-        """Arm the robot as its driver.
+        """Take control, and arm the robot.
 
         On a busy machine the robot's answer may come too late, and E must be pressed again.
         """
@@ -122,13 +122,13 @@ class Console:
             except AssertionError:
                 self.page.keyboard.up(key)
                 with self._robot.operator() as operator:
-                    operator.place(0)  # In twin time it may have reached a wall by now.
+                    operator.place(0)  # In twin time, the car may have reached a wall.
             else:
                 return
         raise AssertionError(f"Nothing moved, though {key} was held.")
 
     def stop(self) -> None:
-        """Stop the robot, and wait until it has."""
+        """Stop the robot, and wait until it has stopped."""
         self.page.keyboard.press("Space")
         self.await_state(robot="emergency")
 
@@ -145,11 +145,11 @@ class Console:
 class Pins:
     """The pins of a car's drive, read from the ledger of its twin.
 
-    Unlike `read_ledger` this reads each line once, because it is called often and the ledger of a
+    Unlike `read_ledger`, it reads each line once, because it is called often and the ledger of a
     shared robot gets long.
 
     Attributes:
-        rest_ns: Time of the last rest, ns; 0 for none yet.
+        rest_ns: Time at which the drive last came to rest, ns; 0 if it has not.
     """
 
     def __init__(self, robot: RunningRobot) -> None:
@@ -168,7 +168,7 @@ class Pins:
         self._read += len(whole) + len(newline)
         for line in whole.splitlines():
             if b'"kind": "pin"' not in line:
-                continue  # The edges of the encoder are many, and no output.
+                continue  # Skip the many edges of the encoder, which is not an output.
             change = msgspec.json.decode(line, type=Transition)
             if change.pin in self._duties:
                 self._duties[change.pin] = 0.0 if change.released else change.duty or 0.0
@@ -185,9 +185,9 @@ class Pins:
         until(lambda: self.moves(way), 60.0)
 
     def moves(self, way: float = 0.0) -> bool:
-        """Return True if it was propelled since it was last at rest, in a direction or in any.
+        """Return True if the car has been driven in the direction of the sign of `way`, or in any.
 
-        A busy machine reads so seldom that a robot in twin time may be at a wall by then.
+        Motion since the last `forget` counts: on a busy machine, the car may be at a wall already.
         """
         self.propels()
         return any(push * (way or push) > 0.0 for push in self._pushes)
@@ -197,7 +197,7 @@ class Pins:
         self.forget()
 
     def await_deadline(self, observer: RobotClient, before: Observation) -> None:
-        """Wait for rest, and check that it comes within the deadline after the last command."""
+        """Wait for rest, and check that it begins within the deadline after the last command."""
         commands = [before.command_ns or 0]
 
         def rests() -> bool:

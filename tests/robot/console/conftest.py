@@ -17,7 +17,7 @@ from tests.robots import CAR, IN_A_ROOM, write_profile
 def served_car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
     """A car with a camera on its twin, for all tests of a module.
 
-    Its time advances with the page's observations, so that a busy machine changes nothing.
+    Its time advances with the page's observations, so that a busy machine has no effect.
     """
     with _served(tmp_path_factory.mktemp("car"), "twin") as robot:
         yield robot
@@ -25,9 +25,9 @@ def served_car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobo
 
 @pytest.fixture
 def car(served_car: RunningRobot) -> RunningRobot:
-    """The same car at its start, because at a wall it would not drive.
+    """The car of `served_car`, put at its start because it could not drive at a wall.
 
-    Tests leave it disarmed or stopped.
+    Each test must leave the car disarmed or stopped.
     """
     with served_car.operator() as operator:
         operator.place(0)
@@ -36,7 +36,7 @@ def car(served_car: RunningRobot) -> RunningRobot:
 
 @pytest.fixture
 def hasty_car(tmp_path: Path) -> Iterator[RunningRobot]:
-    """The same car in real time."""
+    """A car with a camera on its twin, in real time."""
     with _served(tmp_path, "real") as robot:
         yield robot
 
@@ -48,7 +48,7 @@ def _served(folder: Path, clock: Literal["twin", "real"]) -> RunningRobot:
 
 @pytest.fixture
 def visit(chromium: Browser) -> Iterator[Callable[..., Console]]:
-    """Open the console of a robot; the page is closed after the test, without errors."""
+    """Open the console of a robot. After the test, the page is closed, and must have no errors."""
     with contextlib.ExitStack() as stack:
         opened: list[Console] = []
 

@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 Visit = Callable[..., Console]
 
-# The values that the page decodes and encodes again; integers beyond 2^53 are BigInt there.
+# Script that decodes and encodes values again; integers beyond 2^53 become BigInt.
 _AGAIN = """async (texts) => {
   const { decode, encode } = await import("/console/codec.js");
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -68,7 +68,7 @@ def test_broken_bytes_are_refused(car: RunningRobot, visit: Visit) -> None:
 
 
 def test_the_page_computes_the_robots_proof(car: RunningRobot, visit: Visit) -> None:
-    """Proofs match for keys in any notation, with and without a certificate; versions do too."""
+    """Proofs are equal for keys in any notation, with or without a certificate."""
     console = visit(car, key="")
     cases = [(new_key(), bytes(range(32)), certificate) for certificate in (b"", b"\x01" * 32)]
     for key, nonce, certificate in cases:

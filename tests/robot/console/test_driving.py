@@ -1,4 +1,4 @@
-"""Driving with the console, and its stops."""
+"""Driving and stopping with the console."""
 
 from collections.abc import Callable
 
@@ -54,7 +54,7 @@ def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> Non
 def test_a_page_that_dies_stops_the_robot_within_the_deadline(
     hasty_car: RunningRobot, visit: Visit
 ) -> None:
-    """The page's process crashes without a message, the worst case of a closed tab."""
+    """The page's process crashes without sending a message, the worst case of a closed tab."""
     console, pins = visit(hasty_car), Pins(hasty_car)
     console.arm()
     console.drive("w", pins)
@@ -73,7 +73,7 @@ def test_a_page_that_dies_stops_the_robot_within_the_deadline(
 def test_space_and_escape_stop_the_robot_with_any_focus(
     car: RunningRobot, visit: Visit, key: str, focus: str
 ) -> None:
-    """Space and Escape press no focused button, and only arming again ends the stop."""
+    """Space and Escape do not press a focused button; only arming ends the stop."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -85,7 +85,7 @@ def test_space_and_escape_stop_the_robot_with_any_focus(
 
 
 def test_the_stop_button_acts_on_pointer_down(car: RunningRobot, visit: Visit) -> None:
-    """The click that follows does not count as a second stop."""
+    """The click after the pointer-down does not count as a second stop."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -104,7 +104,7 @@ def test_the_stop_button_acts_on_pointer_down(car: RunningRobot, visit: Visit) -
 
 
 def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:
-    """Tilt is relative to the pose when it was enabled; tilting away drives forward."""
+    """Tilt is relative to the pose at which it was enabled; tilting away drives forward."""
     console, pins = visit(car, **PHONE), Pins(car)
     console.arm()
     browser = console.page.context.new_cdp_session(console.page)

@@ -1,4 +1,4 @@
-"""Files of the console in the package."""
+"""Files of the console that the package contains."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Orders that nobody gave: layouts, modifiers, the focus, gamepads and lost ends of presses."""
+"""Inputs that must not drive: with layouts, modifiers, focus, gamepads and lost releases."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, Final
@@ -25,9 +25,9 @@ LAYOUTS: Final = {
     "Bépo": "\N{LATIN SMALL LETTER E WITH ACUTE} a u i p y o q v % =",
     "Russian": " ".join("цфывучкьг=-"),
 }
-"""Characters of each layout at the places of `_PLACES`."""
+"""Characters of each layout for the keys of `_PLACES`, in the same order."""
 
-# Messages that order nothing.
+# Messages that are not orders.
 _QUIET: Final = {"acknowledge", "ping", "hello"}
 
 
@@ -44,7 +44,7 @@ class Input:
         self._browser: CDPSession = self.page.context.new_cdp_session(self.page)
 
     def key(self, kind: str, code: str, key: str, modifiers: int = 0, **options: Any) -> None:
-        """Press or release a key: "Down" or "Up", its place and its character."""
+        """Press ("Down") or release ("Up") a key, given by its position and its character."""
         event = {"type": f"key{kind}", "code": code, "key": key, "modifiers": modifiers}
         self._browser.send("Input.dispatchKeyEvent", event | options)
 
@@ -53,15 +53,15 @@ class Input:
         self.key("Up", code, key)
 
     def touch(self, kind: str, *points: tuple[float, float]) -> None:
-        """Touch the page: "Start", "Move", "End" or "Cancel", and the fingers that are down."""
+        """Send a touch event, "Start", "Move", "End" or "Cancel", with the points of fingers."""
         fingers = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
         event = {"type": f"touch{kind}", "touchPoints": fingers}
         self._browser.send("Input.dispatchTouchEvent", event)
 
     def orders(self) -> list[Any]:
-        """Return what was ordered since the last call, after the page has answered twice more.
+        """Return the orders since the last call, after the page has answered twice more.
 
-        Commands are pairs of signs of steering and throttle; equal ones in a row are one.
+        A command is given as the signs of steering and throttle; consecutive equal commands as one.
         """
         self._await_answers(2)
         sent, self.console.sent = self.console.sent, []
@@ -74,13 +74,13 @@ class Input:
         return orders
 
     def held(self) -> tuple[int, int]:
-        """Return the command that the page sends now, after those under way."""
+        """Return the command that the page sends now, after earlier commands have arrived."""
         self.orders()
         (order,) = self.orders()
         return order
 
     def _await_answers(self, count: int) -> None:
-        self.page.evaluate("0")  # Messages that were sent before arrive here before its result.
+        self.page.evaluate("0")  # Earlier messages arrive before the result of this call.
         least = len(self.console.sent) + count
 
         def has_answered() -> bool:
@@ -97,7 +97,7 @@ def _signs(values: list[float]) -> tuple[int, int]:
 
 @pytest.fixture
 def person(car: RunningRobot, visit: Visit) -> Iterator[Input]:
-    """A person who has armed the car, with a cap at which it stays where it is."""
+    """A person who has armed the car, with a cap so low that the car stays in place."""
     console = visit(car, script=_PADS)
     console.await_state(link="open", view="drive")
     console.page.locator("#cap").fill("10")
@@ -110,7 +110,7 @@ def person(car: RunningRobot, visit: Visit) -> Iterator[Input]:
 
 
 def test_a_key_has_one_meaning_on_every_layout(person: Input) -> None:
-    """Driving keys drive and are no shortcuts, and shortcuts go by their place."""
+    """A key is identified by its position; driving keys are never shortcuts."""
     page, cap = person.page, person.page.locator("#cap")
     for name, letters in LAYOUTS.items():
         at = dict(zip(_PLACES, letters.split(), strict=True))
@@ -137,7 +137,7 @@ def test_a_key_has_one_meaning_on_every_layout(person: Input) -> None:
         assert tap("Minus") == [], name
         assert cap.input_value() == "10", name
         assert tap("KeyX") == ["disarm"], name
-        # The keys that drive do not arm a robot that was stopped.
+        # Driving keys do not arm a stopped robot.
         person.tap("Space", " ")
         assert "emergencystop" in person.orders()
         for code in _DRIVING:
@@ -148,7 +148,7 @@ def test_a_key_has_one_meaning_on_every_layout(person: Input) -> None:
         person.console.await_state(robot="armed")
 
 
-# What a page does not tell from the end of a press: after each, W must be pressed again.
+# Events after which the page may miss the release of a key, so that W must be pressed again.
 _RELEASES: Final = {
     "Meta down": lambda person: person.key("Down", "MetaLeft", "Meta", 4),
     "Meta up": lambda person: person.key("Up", "MetaLeft", "Meta"),
@@ -176,7 +176,7 @@ _RELEASES: Final = {
 
 
 def test_held_keys_are_released_with_modifiers_and_the_focus(person: Input) -> None:
-    """A repeat does not press them again, and releasing them changes nothing."""
+    """After that, repeats and releases of the keys have no effect."""
     for name, release in _RELEASES.items():
         person.page.focus("#stage")
         person.key("Down", "KeyW", "w")
@@ -189,8 +189,8 @@ def test_held_keys_are_released_with_modifiers_and_the_focus(person: Input) -> N
         assert person.orders() == [(0, 0)], name
 
 
-def test_combinations_and_input_methods_are_no_orders(person: Input) -> None:
-    """Combinations, input methods and keys in a list move nothing; a held Enter presses once."""
+def test_combinations_and_input_methods_do_not_drive(person: Input) -> None:
+    """Keys in a list do not drive either; a held Enter presses a button once."""
     for modifier in (1, 2, 4):
         for code, key in zip(_PLACES, LAYOUTS["QWERTY"].split(), strict=True):
             person.tap(code, key, modifiers=modifier, commands=[])
@@ -214,8 +214,8 @@ def test_combinations_and_input_methods_are_no_orders(person: Input) -> None:
     person.console.await_state(robot="disarmed")
 
 
-def test_keys_held_while_somebody_else_arms_are_no_orders(car: RunningRobot, person: Input) -> None:
-    """Held keys count once they are pressed again."""
+def test_keys_held_while_another_person_arms_do_not_drive(car: RunningRobot, person: Input) -> None:
+    """The held keys count again after they were released and pressed."""
     person.tap("KeyX", "x")
     person.console.await_state(robot="disarmed")
     person.key("Down", "KeyW", "w")
@@ -248,8 +248,8 @@ globalThis.press = (index, button, value = 1) => {
 """
 
 
-def test_a_gamepad_drives_only_after_it_rested_as_it_is_now(person: Input) -> None:
-    """Rest is required whenever a pad comes, goes or changes its place, and of each input."""
+def test_a_gamepad_drives_only_after_a_rest_since_its_last_change(person: Input) -> None:
+    """All inputs must rest whenever a pad is connected, disconnected or changes its index."""
 
     def pad(script: str) -> tuple[int, int]:
         person.page.evaluate(script)
@@ -258,21 +258,21 @@ def test_a_gamepad_drives_only_after_it_rested_as_it_is_now(person: Input) -> No
     rest, ahead = (0, 0), (0, 1)
     assert pad("pad(0, {})") == rest
     assert pad("pads[0].axes[1] = -1") == ahead
-    # A second pad comes while the first one is pushed, and goes again.
+    # A second pad is connected and disconnected while the first pad is pushed.
     assert pad("pad(1, { axes: [0, 0, 0, -1] })") == rest
     assert pad("pads[0].axes[1] = 0") == rest
     assert pad("pads[0].axes[1] = -1") == ahead
     assert pad("pad(1, null)") == rest
     assert pad("pads[0].axes[1] = 0.05") == rest
     assert pad("pads[0].axes[1] = -1") == ahead
-    # It changes its place without an event, and what takes its place rests wrongly.
+    # The pad changes its index without an event, and another pad at its index is not at rest.
     assert pad("pads = [null, { ...pads[0], index: 1 }]") == rest
     assert pad("pads = [null, null]") == rest
     assert pad("pad(1, { axes: [0, 0, 0, -1] }); pad(0, {})") == rest
     assert pad("pads[0].axes[1] = -1") == ahead
     assert pad("pads[0] = null") == rest
     assert pad("pad(1, null)") == rest
-    # Two triggers that rest half-way until they are touched.
+    # Two triggers report half their travel until they are touched.
     assert pad("pad(0, { pressed: [[6, 0.5], [7, 0.5]] })") == rest
     assert pad("press(0, 7, 0)") == rest
     assert pad("press(0, 6, 0)") == rest
@@ -281,7 +281,7 @@ def test_a_gamepad_drives_only_after_it_rested_as_it_is_now(person: Input) -> No
     assert pad("pads[0].axes[0] = 0") == rest
     assert pad("press(0, 7, 0)") == rest
     assert pad("press(0, 7, 1)") == ahead
-    # Another window has the focus, and then a key with Meta goes down.
+    # Another window gets the focus, and then a key is pressed with Meta.
     assert pad("document.hasFocus = () => false") == rest
     assert pad("press(0, 7, 0); press(0, 0)") == rest
     assert pad("press(0, 0, 0); document.hasFocus = () => true") == rest
@@ -294,14 +294,14 @@ def test_a_gamepad_drives_only_after_it_rested_as_it_is_now(person: Input) -> No
 
 
 def test_a_gamepad_of_unknown_mapping_is_ignored(person: Input) -> None:
-    """The page says so, and its buttons do nothing either."""
+    """The page reports it, and the pad's buttons have no effect either."""
     for change in ("{ axes: [0, 0, 0, 0, 0, 0] }", "{ axes: [0, 0, -1, -1, 0, -1] }"):
         person.page.evaluate(f"pad(0, {change}, '')")
         assert person.held() == (0, 0)
     person.page.evaluate("pads[0].axes[1] = -1; press(0, 7); press(0, 1)")
     assert person.held() == (0, 0)
     person.console.await_words("#log", 'The gamepad "Pad" is ignored')
-    # Another pad is used, and a button that is held when it comes does not arm.
+    # Another pad is used; a button that is held while it is connected does not arm.
     person.tap("KeyX", "x")
     person.console.await_state(robot="disarmed")
     person.orders()
@@ -313,8 +313,8 @@ def test_a_gamepad_of_unknown_mapping_is_ignored(person: Input) -> None:
     person.page.evaluate("pad(0, null); pad(1, null)")
 
 
-def test_the_stick_springs_back_however_its_press_ends(person: Input) -> None:
-    """One of two mouse buttons, a cancelled touch, and the first of two fingers."""
+def test_the_stick_returns_to_its_centre_after_any_end_of_a_press(person: Input) -> None:
+    """The press ends with one of two mouse buttons, a cancelled touch, or one of two fingers."""
     page = person.page
     box = page.locator("#pad").bounding_box()
     assert box is not None
@@ -331,7 +331,7 @@ def test_the_stick_springs_back_however_its_press_ends(person: Input) -> None:
     assert person.held() == (0, 0)
     page.mouse.down()
     assert person.held() == (0, -1)
-    # The pointerup went elsewhere.
+    # The page has not received the pointerup event.
     page.evaluate(
         "document.getElementById('pad').dispatchEvent("
         "new PointerEvent('pointermove', { pointerId: 1, buttons: 0 }))"

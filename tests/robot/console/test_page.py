@@ -19,7 +19,7 @@ Visit = Callable[..., Console]
 
 
 def test_the_key_is_removed_from_the_address(car: RunningRobot, visit: Visit) -> None:
-    """The key is stored only on request, and "leave" deletes it; without it a page has a form."""
+    """The key is stored only on request; "leave" deletes it, and then the page shows a form."""
     console = visit(car)
     page = console.page
     console.await_state(link="open", view="drive")
@@ -94,7 +94,7 @@ def test_controls_are_large_and_do_not_overlap(
     for name, _, _, w, h in boxes:
         assert (w >= 40 and h >= 32) or name == "", name
     if size is not PHONE_ON_ITS_SIDE and size is not DESK:
-        # Sticky elements of an upright phone cover what is scrolled below them.
+        # On an upright phone, sticky elements cover elements that are scrolled below them.
         boxes = [box for box in boxes if box[0] not in ("stop", "arm", "hand")]
     for (one, x, y, w, h), (other, u, v, s, t) in itertools.combinations(boxes, 2):
         apart = x + w <= u + 1 or u + s <= x + 1 or y + h <= v + 1 or v + t <= y + 1

@@ -1,4 +1,4 @@
-"""Several clients, a slow page, a restarted robot, and recordings."""
+"""The console with other clients, a slow page, a restarted robot, and recordings."""
 
 import contextlib
 import os
@@ -69,7 +69,7 @@ def test_a_slow_page_stops_its_robot_and_delays_no_other_client(
     console.stop()
 
 
-def test_a_page_reconnects_after_a_restart_and_moves_nothing(
+def test_a_page_reconnects_after_a_restart_without_moving_the_robot(
     chromium: Browser, tmp_path: Path
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as found:
@@ -100,8 +100,8 @@ def test_a_page_reconnects_after_a_restart_and_moves_nothing(
         console.stop()
 
 
-def test_a_displaced_page_waits_for_its_person(car: RunningRobot, visit: Visit) -> None:
-    """With more people than places, pages that reconnect would displace one another endlessly."""
+def test_a_displaced_page_reconnects_only_on_request(car: RunningRobot, visit: Visit) -> None:
+    """If more pages than the limit reconnected by themselves, they would displace one another."""
     console = visit(car)
     console.await_state(link="open")
     with contextlib.ExitStack() as stack:
@@ -157,7 +157,7 @@ def test_recording_a_drive(car: RunningRobot, visit: Visit) -> None:
 
 
 def test_sliders_drive_a_finger(chromium: Browser, tmp_path: Path) -> None:
-    """Each tendon starts at its present value, and follows and holds its slider."""
+    """Each slider starts at the tendon's present value; the tendon follows and keeps its value."""
     (tmp_path / "finger.toml").write_text((_SHIPPED / "finger-pwm.toml").read_text())
     with (
         run_robot(tmp_path / "finger.toml", folder=tmp_path, arguments=IN_A_ROOM) as robot,
@@ -178,7 +178,7 @@ def test_sliders_drive_a_finger(chromium: Browser, tmp_path: Path) -> None:
 
 
 def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_path: Path) -> None:
-    """A policy drives once a person arms the robot, until a person presses a key."""
+    """The policy drives after a person has armed the robot, until a person presses a key."""
     car = write_profile(tmp_path, PATIENT_CAR)
     net = {"eyes": "none", "nerves": (1,), "low": (0.3, 0.3), "high": (0.3, 0.3)}
     card = clone_card(car.action_layout(), car.state_layout(), **net)
@@ -201,7 +201,7 @@ def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_pa
         page.click("#arm")
         pins.await_motion(1.0)
         console.await_words("#policy-state", "student: it drives")
-        # A driving key takes over without rearming, and the page shows what the policy wants.
+        # A driving key takes control without rearming; the page shows the policy's suggestions.
         console.drive("s", pins, -1.0)
         console.await_state(driver="me", robot="armed")
         page.locator("#legend-wanted").wait_for()

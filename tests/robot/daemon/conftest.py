@@ -1,4 +1,4 @@
-"""A daemon for each test that takes `robot`. Tests may be coroutines, which run in its loop."""
+"""Fixture `robot`: a daemon for each test. Tests that are coroutines run in its event loop."""
 
 import asyncio
 import inspect
@@ -48,7 +48,7 @@ def plan(request: pytest.FixtureRequest, tmp_path: Path) -> DaemonPlan:
 
 @pytest.fixture
 def key(plan: DaemonPlan) -> bytes:
-    """The key of the robot; empty for none."""
+    """The key of the robot; empty if it accepts every client."""
     made = plan.credentials and load_credentials(Path(plan.credentials))
     return parse_key(made.key) if made else b""
 
@@ -64,7 +64,7 @@ def runner() -> Iterator[asyncio.Runner]:
 def robot(
     plan: DaemonPlan, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Running]:
-    """A served robot, whose time moves in steps if the plan says so."""
+    """A served robot; its time moves in steps if the plan's clock is "twin"."""
     clock = SteppedClock() if plan.card.clock == "twin" else Clock()
     serving = running(plan, monkeypatch, clock)
     robot = runner.run(serving.__aenter__())

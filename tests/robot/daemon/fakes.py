@@ -22,7 +22,7 @@ from tests.robot.guard.plans import quick_car
 class FakeGuard:
     """The guard's end of the socket, which applies orders by the rules, and replies with its state.
 
-    It has neither sensors nor outputs, and ends no command at its deadline by itself.
+    It has neither sensors nor outputs, and does not stop at the deadline of a command.
     """
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
@@ -36,7 +36,7 @@ class FakeGuard:
         self._rules = Rules(quick_car(), now_ns())
 
     def attach(self) -> None:
-        """Answer orders as they arrive, as on a real clock."""
+        """Handle each order when it arrives, as a guard does in real time."""
         asyncio.get_running_loop().add_reader(self._socket, self.tick)
 
     def close(self) -> None:
@@ -51,7 +51,7 @@ class FakeGuard:
                 data = self._socket.recv(MAX_DATAGRAM)
             except BlockingIOError:
                 break
-            except ConnectionResetError:  # The daemon closed, and had not read everything.
+            except ConnectionResetError:  # The daemon closed the socket with unread states in it.
                 data = b""
             if not data:
                 asyncio.get_running_loop().remove_reader(self._socket)
@@ -121,7 +121,7 @@ class FakeCamera(Camera):
 
 
 class SteppedClock(Clock):
-    """A clock that moves in steps, as that of a twin does."""
+    """A clock that moves in steps, like the clock of a twin."""
 
     def __init__(self) -> None:
         self.ns = 1_000_000_000

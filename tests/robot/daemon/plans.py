@@ -45,9 +45,9 @@ def car_plan(**changes: Any) -> DaemonPlan:
 
 
 def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:
-    """Return a JPEG that differs from that of every other number."""
+    """Return a JPEG that is different for each number."""
     rng = np.random.default_rng(number)
-    # Coarse blocks, since noise does not compress.
+    # The image has coarse blocks, because noise does not compress.
     coarse = rng.integers(0, 256, (size[1] // 8, size[0] // 8, 3), dtype=np.uint8)
     return simplejpeg.encode_jpeg(coarse.repeat(8, 0).repeat(8, 1), quality=80)
 

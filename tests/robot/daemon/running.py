@@ -45,7 +45,7 @@ PATIENCE_S = 20.0
 
 
 async def until(condition: Callable[[], object], what: str) -> None:
-    """Wait for a condition; the error names it."""
+    """Wait for a condition; on timeout, the error contains `what`."""
     try:
         async with asyncio.timeout(PATIENCE_S):
             while not condition():
@@ -55,7 +55,7 @@ async def until(condition: Callable[[], object], what: str) -> None:
 
 
 class Client:
-    """A client that sends exactly what a test asks for."""
+    """A client that sends only the messages of a test, valid or not."""
 
     def __init__(self, socket: aiohttp.ClientWebSocketResponse, certificate: bytes) -> None:
         self.socket = socket
@@ -66,7 +66,7 @@ class Client:
         await self.socket.send_bytes(encode(message))
 
     async def receive(self) -> RobotMessage | None:
-        """Return the next message; None after the robot closed the connection."""
+        """Return the next message, or None after the robot has closed the connection."""
         async with asyncio.timeout(PATIENCE_S):
             message = await self.socket.receive()
         if message.type is not aiohttp.WSMsgType.BINARY:
@@ -83,7 +83,7 @@ class Client:
         raise AssertionError(f"The robot closed without a {kind.__name__}: {self.received}")
 
     async def closed_with(self) -> str:
-        """Return the reason with which the robot closes the connection."""
+        """Return the reason that the robot gives when it closes the connection."""
         refused = await self.expect(Refused)
         while not refused.fatal:
             refused = await self.expect(Refused)
@@ -111,7 +111,7 @@ class Client:
         return await self.expect(Observation)
 
     async def drive(self, seq: int, *values: float, answers: int | None = None) -> Observation:
-        """Command in answer to a new observation."""
+        """Send a command that answers a new observation, and return the next observation."""
         seen = (await self.observe()).seq if answers is None else answers
         await self.send(Command(seq=seq, answers=seen, values=values or (0.0, 0.5)))
         return await self.expect(Observation)
@@ -119,7 +119,7 @@ class Client:
 
 @dataclass
 class Running:
-    """A serving daemon and its surroundings."""
+    """A daemon that serves, with its fake guard, camera and clock."""
 
     plan: DaemonPlan
     clock: Clock
@@ -137,7 +137,7 @@ class Running:
 
     @staticmethod
     def transport(client: Client) -> asyncio.Transport:
-        """Return the transport of a client, to break it."""
+        """Return the transport of a client, so that a test can break the connection."""
         connection: Any = client.socket
         return connection._conn.transport
 

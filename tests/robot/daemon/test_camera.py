@@ -1,4 +1,4 @@
-"""Camera thread of the daemon: only valid, new frames are passed on."""
+"""Camera thread of the daemon, which passes on only valid, new frames."""
 
 from collections.abc import Callable, Iterator
 

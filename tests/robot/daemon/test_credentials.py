@@ -21,7 +21,7 @@ from shapechanger.robot.serve import recordings_folder
 from tests.robot.daemon.plans import car_plan
 
 
-def test_credentials_are_made_once_and_are_the_owners(tmp_path: Path) -> None:
+def test_credentials_are_made_once_and_only_their_owner_can_read_them(tmp_path: Path) -> None:
     folder = tmp_path / "a" / "car"
     made = make_credentials(folder, "my car")
     assert make_credentials(folder, "my car") == made == load_credentials(folder)
@@ -50,7 +50,7 @@ def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> Non
 def test_incomplete_and_malformed_credentials_are_refused(tmp_path: Path, name: str) -> None:
     """Missing files are not made again, because clients have stored the existing credentials."""
     make_credentials(tmp_path, "car")
-    if name != "certificate.key":  # OpenSSL reads that one.
+    if name != "certificate.key":  # Only OpenSSL checks this file.
         for garbage in (b"short", b"\xff\xfe"):
             (tmp_path / name).write_bytes(garbage)
             with pytest.raises(RobotError, match=name):
@@ -80,7 +80,7 @@ _FOLDERS = {
 def test_folders_follow_the_xdg_specification(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, variable: str
 ) -> None:
-    """No name of a robot leaves them."""
+    """A robot's name cannot select a folder outside the user's folders."""
     folder_of, default = _FOLDERS[variable]
     monkeypatch.delenv(variable, raising=False)
     assert folder_of("car") == Path.home() / default

@@ -3,7 +3,7 @@
 from benchmarks.fuzz_link import fuzz
 
 
-def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
+def test_mutated_messages_neither_crash_nor_move_the_robot() -> None:
     counts = fuzz(5_000, seed=1)
     assert counts["strangers refused"] == 1_250
     assert counts["connections ended"] > 1_000

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.realtime
 
 
 class Ends:
-    """Both ends of the connection, and the calls received."""
+    """Both ends of the connection, and the calls of its two callbacks."""
 
     def __init__(self) -> None:
         self.guard, daemon = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

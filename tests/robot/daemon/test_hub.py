@@ -1,4 +1,4 @@
-"""Observations and messages of one client; `test_session_stateful.py` has the rules of control."""
+"""Observations and messages of clients; `test_session_stateful.py` tests the rules of control."""
 
 import math
 from collections.abc import Callable
@@ -31,7 +31,7 @@ ANN, SAC = Client(1, "Ann", "person"), Client(3, "sac")
 
 
 def new_hub(order: Callable[[Order], object] = lambda order: None) -> SessionHub:
-    """Return the hub of a car at 50 ns."""
+    """Return the hub of a car; the robot's time is 50 ns."""
     clock = SteppedClock()
     clock.ns = 50
     return SessionHub(car_plan(), clock, order)
@@ -44,7 +44,7 @@ def observed(hub: SessionHub, frame_sent: int | None = 0) -> Observation:
 def seen_at_50_ns(
     state: GuardState | None = None, *, frames: int = 3, frame_sent: int | None = 0
 ) -> Observation:
-    """Build the observation of a robot with a state of 40 ns and a frame of 30 ns."""
+    """Build an observation at 50 ns, from a state of 40 ns and a frame of 30 ns."""
     hub = new_hub()
     for _ in range(frames):
         hub.on_frame(Frame(b"jpeg", 30))
@@ -52,26 +52,26 @@ def seen_at_50_ns(
     return observed(hub, frame_sent)
 
 
-def test_what_is_unknown_is_nan() -> None:
+def test_unknown_quantities_are_nan() -> None:
     seen = seen_at_50_ns(guard_state(applied=(0.1, 0.5)))
     assert seen.state[0] == 0.25
     assert math.isnan(seen.state[1])
     assert seen.state[2] == 0.5
     assert seen.sources == {"speed": "wheel", "distance": "absent"}
-    seen = observed(new_hub())  # Without a state of the guard.
+    seen = observed(new_hub())  # The guard has sent no state.
     assert all(map(math.isnan, seen.state))
     assert "guard" in seen.stop_reason
     assert not seen.armed
     assert seen.state_ns == 50
 
 
-def test_a_frame_is_sent_once_and_to_those_who_want_it() -> None:
+def test_a_frame_is_sent_once_to_each_client_that_requests_frames() -> None:
     assert seen_at_50_ns().frame == b"jpeg"
     again = seen_at_50_ns(frame_sent=3)
     assert (again.frame, again.frame_seq, again.captured_ns) == (None, 3, 30)
     declined = seen_at_50_ns(frame_sent=None)
     assert (declined.frame, declined.captured_ns) == (None, 30)
-    blind = seen_at_50_ns(frames=0)  # The time is the state's.
+    blind = seen_at_50_ns(frames=0)  # Its capture time is the time of the state.
     assert (blind.frame, blind.frame_seq, blind.captured_ns) == (None, 0, 40)
 
 
@@ -94,8 +94,8 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
     assert other.action_applied == (0.0, 0.5)
 
 
-def test_a_person_always_gets_a_place() -> None:
-    """6 programs and 8 clients in total; the oldest goes that does not have control."""
+def test_a_person_can_always_connect() -> None:
+    """At the limits of 6 programs and 8 clients, the oldest client without control is removed."""
     hub, programs = new_hub(), [Client(number) for number in range(6)]
     people = [Client(10 + number, f"person {number}", "person") for number in range(3)]
     for client in programs:
@@ -136,7 +136,7 @@ def test_a_client_keeps_the_newest_lease_and_events() -> None:
     assert list(iter(client.take, None)) == kept
 
 
-def test_too_many_unread_answers_do_not_fit() -> None:
+def test_a_client_with_too_many_unread_answers_is_expelled() -> None:
     client = Client(1)
     for number in range(256):
         client.post(Pong(token=number, now_ns=0))

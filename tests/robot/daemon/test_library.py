@@ -1,4 +1,4 @@
-"""Library of recordings: exact bytes, bounded answers, nothing outside the folder."""
+"""Library of recordings: it sends exact bytes in bounded answers, only from its folder."""
 
 import shutil
 import tempfile
@@ -157,7 +157,7 @@ def test_damage_is_reported_and_the_rest_is_readable(ask: Ask, tmp_path: Path) -
     assert (piece.total, len(piece.lines)) == (5, 5)
     (path / "frames" / "000002.jpg").unlink()
     assert "000002.jpg" in refusal(ask(Fetch(episode=path.name)))
-    # A line cannot refer outside the episode.
+    # A line must not refer to a file outside the episode.
     (tmp_path / "secret.jpg").write_bytes(b"secret")
     secret = '{"kind":"step","step":0,"frame":["../../secret.jpg",6,""]}\n'
     (path / "steps.jsonl").write_text(secret)
@@ -175,7 +175,7 @@ _parts = st.lists(st.sampled_from((b"a", b"bb\n", b"\n", b"c\rd\n", b"x" * 70_00
 def test_every_complete_line_of_a_growing_file_is_found(
     parts: list[bytes], replaced: set[int]
 ) -> None:
-    """A file that is replaced, and may be shorter then, is read again."""
+    """A file is read again after it was replaced by another file, which may be shorter."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "lines"
         path.touch()

@@ -60,7 +60,7 @@ async def test_lockstep_waits_for_its_frame(robot: Running) -> None:
 
 @STEPPED
 async def test_the_client_in_control_advances_time_in_steps(robot: Running) -> None:
-    """Steps are possible at any rate, because no limit of messages applies in lockstep."""
+    """The limit of messages per second does not apply in lockstep."""
     clock = stepped(robot)
     async with robot.client(pace="lockstep") as driver, robot.client() as watcher:
         await driver.take()

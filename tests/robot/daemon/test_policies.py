@@ -17,7 +17,7 @@ from tests.robot.daemon.running import Running, until
 
 pytestmark = pytest.mark.plan(policies=".")
 
-# Stands for a policy's process: repeats its task, and does what the policy's name says.
+# Fake process of a policy: prints its task, and behaves as the policy's name says.
 _PROCESS = """
 import json, sys, time
 task = json.loads(sys.stdin.readline())
@@ -41,7 +41,7 @@ _NAMES = ("babble", "bad", "crash", "deaf", "student", "teacher")
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with policies, and something else."""
+    """A folder with policies and another file."""
     for name in _NAMES:
         (tmp_path / f"{name}.onnx").write_bytes(b"")
     (tmp_path / "readme.txt").write_text("")
@@ -50,7 +50,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def said() -> list[PolicyState]:
-    """The messages of the policies."""
+    """The states that the policies have posted."""
     return []
 
 
@@ -58,7 +58,7 @@ def said() -> list[PolicyState]:
 def one(
     folder: Path, plan: DaemonPlan, runner: asyncio.Runner, said: list[PolicyState]
 ) -> Iterator[PolicyRunner]:
-    """Policies on board of a robot that can be reached."""
+    """The policies of a robot that has started to serve."""
     one = PolicyRunner(plan, said.append)
     one._command = _COMMAND
 

@@ -31,7 +31,7 @@ class Fake:
 
 
 async def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
-    """A served request restarts it, and a hello has its own."""
+    """A served request restarts the timeout; an open link ends it."""
     connections = _listener(max_total=4, max_per_address=2, timeout_s=0.05)
     page, silent, asks, known = (Fake(name) for name in "aabc")
     for sock in (page, silent, asks, known):
@@ -72,7 +72,7 @@ def test_a_new_connection_always_fits_and_the_limits_hold(
             most = Counter(v.address for v in here).most_common(1)
             crowd = [v for v in here if v.address == most[0][0]] if most else []
             first = same[:1] if len(same) >= max_per_address else crowd[: len(here) >= max_total]
-            # The oldest of its address, or of the address that has the most.
+            # The dropped connection is the oldest of its address, or of the address with the most.
             assert [v for v in here if v.dropped] == first
             assert not sock.dropped
             assert len(connections._waiting) <= max_total

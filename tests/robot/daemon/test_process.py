@@ -1,4 +1,4 @@
-"""The daemon in its own process, as the supervisor starts it."""
+"""The daemon in a separate process, as the supervisor starts it."""
 
 import json
 import os
@@ -43,7 +43,7 @@ class Started:
 
 @pytest.fixture
 def begun(tmp_path: Path) -> Iterator[Started]:
-    """A daemon that has no state from the guard yet."""
+    """A daemon that has not received a state from the guard yet."""
     file = tmp_path / "ready.json"
     daemon = msgspec.to_builtins(car_plan(camera=None, discovery=True, ready_file=str(file)))
     guard_plan = GuardPlan("car", (ActionPlan("steering"), ActionPlan("throttle")), ())
@@ -85,7 +85,7 @@ def started(begun: Started) -> Started:
 
 
 def test_a_daemon_serves_sends_heartbeats_and_ends_on_a_signal(started: Started) -> None:
-    """A closed log changes nothing."""
+    """The daemon keeps serving after its log was closed."""
     assert started.heart.recv(16) == b"."
     assert started.process.stderr is not None
     started.process.stderr.close()
@@ -99,7 +99,7 @@ def test_a_daemon_serves_sends_heartbeats_and_ends_on_a_signal(started: Started)
 
 
 def test_the_lifeline_ends_when_the_daemon_is_killed(started: Started) -> None:
-    """The thread of the lifeline has no other file open."""
+    """The thread of the lifeline must have no other file open."""
     tasks = Path(f"/proc/{started.process.pid}/task")
     assert 1 in {len(list((task / "fd").iterdir())) for task in tasks.iterdir()}
     poll = select.poll()

@@ -26,14 +26,14 @@ WITHIN_S = 20.0
 
 
 def step(number: int) -> tuple[Step, bytes]:
-    """Return a step that encodes its number, and its frame."""
+    """Return a step whose values contain `number`, and its frame."""
     at_ns, state = number * 50_000_000, (0.0, 0.0, 0.0)
     made = Step(action=(0.0, number / 1e6), driver="person", state=state, captured_ns=at_ns)
     return made, picture(number % 5)
 
 
 class Recording:
-    """A recorder that Ada began, and the messages that she and all clients were sent."""
+    """A recorder that records for Ada, and the messages sent to her and to all clients."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -61,7 +61,7 @@ class Recording:
         return [read_episode(path) for path in episodes_of(self.folder)]
 
 
-def test_a_full_episode_goes_on_in_the_next(
+def test_a_full_episode_is_continued_in_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writer, "FULL_BYTES", 2000)
@@ -92,7 +92,7 @@ def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(
 ) -> None:
     recording = Recording(tmp_path)
     large = b"\xff\xd8" + bytes(bytes_each)
-    while recording.recorder.on:  # As far as the recorder knows, the disk does nothing.
+    while recording.recorder.on:  # The recorder gets no result from the disk.
         recording.add(step(0)[0], large)
     assert recording.told == [RecorderState(text=DISK_TOO_SLOW)]
     recording.listen(lambda: recording.recorder.state().steps == fits and len(recording.told) == 3)
@@ -136,7 +136,7 @@ class Built(Recorder):
         return Sent(observation, frame)
 
 
-def test_the_next_observation_brings_the_applied_outputs() -> None:
+def test_the_applied_outputs_of_a_step_are_from_the_next_observation() -> None:
     built = Built()
     sent = built.see(ADA, seen(1, 100, suggested=(0.9, 0.0)), frame(1))
     built.decided(ADA, sent, (0.5, 7.0), 110)
@@ -172,7 +172,7 @@ def test_times_increase_and_no_frame_repeats(events: list[tuple[bool, Client, in
     pictures_seen = [frame(number) for number in range(22)]
     for now_ns, (looks, who, back) in enumerate(events):
         if looks:
-            picture = pictures_seen[1 + now_ns // 3]  # Each image is seen a few times.
+            picture = pictures_seen[1 + now_ns // 3]  # Several observations have the same image.
             number = len(sent[who]) + 1
             sent[who].append(built.see(who, seen(number, picture.captured_ns), picture))
         elif back < len(sent[who]):
@@ -186,4 +186,4 @@ def test_times_increase_and_no_frame_repeats(events: list[tuple[bool, Client, in
     shown = b""
     for step, jpeg in built.written:
         shown = jpeg or shown
-        assert shown == b"jpeg %d" % step.captured_ns  # Its own, or the one before.
+        assert shown == b"jpeg %d" % step.captured_ns  # Its frame, or the previous frame.

@@ -43,7 +43,7 @@ async def recording(client: Client, on: bool = True) -> RecorderState:
 
 
 async def drive(robot: Running, client: Client, first: int, count: int) -> list[Observation]:
-    """Send `count` commands, each in answer to an observation with a new frame."""
+    """Send `count` commands; each answers an observation with a new frame."""
     seen: list[Observation] = []
     for seq in range(first, first + count):
         robot.show()
@@ -64,7 +64,7 @@ def only(folder: Path) -> Path:
 
 @pytest.mark.plan(deadline_ms=60_000)
 async def test_a_step_pairs_an_observation_and_its_command(robot: Running, tmp_path: Path) -> None:
-    """Steps are recorded while the robot is armed, also after a change of control."""
+    """Steps are recorded whenever the robot is armed, also after a change of control."""
     async with robot.client(role="person", name="Grace") as person, robot.client() as program:
         await program.obtain()
         began = await recording(person)
@@ -116,10 +116,10 @@ async def test_only_persons_record_and_judge(robot: Running, tmp_path: Path) -> 
     assert not (tmp_path / "kept").exists()
 
 
-async def test_a_failing_disk_ends_the_recording_and_not_the_drive(
+async def test_a_failing_disk_ends_the_recording_but_not_the_driving(
     robot: Running, tmp_path: Path
 ) -> None:
-    """A new recording can be started, and is closed when the daemon ends."""
+    """A new recording can be started; its episode is closed when the daemon ends."""
     async with robot.client(role="person") as person:
         await robot.armed(person)
         await recording(person)
@@ -165,7 +165,7 @@ async def test_recordings_cannot_share_a_folder_and_end_with_the_last_person(
     assert any("last person" in outcome for outcome in outcomes)
 
 
-async def test_one_question_about_recordings_at_a_time(robot: Running, tmp_path: Path) -> None:
+async def test_requests_about_recordings_are_one_at_a_time(robot: Running, tmp_path: Path) -> None:
     with EpisodeWriter.create(tmp_path / "kept", HEADER) as writer:
         for number in range(200):
             writer.add(Step(action=(0.0, 0.5), driver="person"), picture(number))

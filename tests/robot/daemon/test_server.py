@@ -27,10 +27,10 @@ pytestmark = pytest.mark.realtime
 
 
 @pytest.mark.plan(secured=True)
-async def test_a_wrong_key_is_refused_slowly(
+async def test_a_wrong_key_is_refused_after_a_pause(
     robot: Running, key: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A client with the right key is not kept out."""
+    """A client with the right key can connect meanwhile."""
     monkeypatch.setattr(session, "_WRONG_KEY_S", 0.05)
     loop = asyncio.get_running_loop()
     for _ in range(3):
@@ -91,7 +91,7 @@ async def test_connections_are_limited_before_authentication(robot: Running) -> 
 
 
 @pytest.mark.parametrize("how", ["release", "close", "abort"])
-async def test_leaving_disarms_the_robot(robot: Running, how: str) -> None:
+async def test_a_disconnection_disarms_the_robot(robot: Running, how: str) -> None:
     async with robot.client(role="person", name="Ann") as client:
         await robot.armed(client)
         if how == "release":
@@ -105,7 +105,7 @@ async def test_leaving_disarms_the_robot(robot: Running, how: str) -> None:
 
 
 async def test_an_emergency_stop_is_reported_to_all(robot: Running) -> None:
-    """All clients get stops, and refusals of the guard; a person who has seen a stop ends it."""
+    """All clients get stops and refusals of the guard; a person who has seen a stop can end it."""
     async with robot.client(role="person") as ann, robot.client(name="sac") as sac:
         await robot.armed(ann)
         await sac.send(EmergencyStop(reason="a cat"))
@@ -125,7 +125,7 @@ async def test_an_emergency_stop_is_reported_to_all(robot: Running) -> None:
 async def test_a_client_that_does_not_read_is_dropped(
     robot: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A client that does not read is dropped, and does not delay others."""
+    """The client's unread messages do not delay other clients."""
     patience_s = 3.0
     monkeypatch.setattr(session, "_SEND_S", patience_s)
     loop, worst = asyncio.get_running_loop(), 0.0

@@ -47,13 +47,13 @@ from tests.robot.daemon.plans import car_plan, guard_state
 MS = 1_000_000
 MAX_AGE_NS = 400 * MS
 DEADLINE_MS = 250
-# Most messages are valid: the next number, in answer to the newest observation, by the holder.
+# Most messages have the next number and answer the newest observation.
 _aheads = st.sampled_from((1, 1, 1, 2, 0, -1))
 _backs = st.sampled_from((0, 0, 0, 1, 3, -1))
 _numbers = st.sampled_from((0.0, 0.5, -1.0, 3.0, math.nan, math.inf))
 _values = st.just((0.0, 0.5)) | st.lists(_numbers, min_size=1, max_size=3).map(tuple)
 
-# What is in force: values, the name of the sender, and the last time, ns.
+# Values of a command or suggestion, the name of its sender, and the time of its end, ns.
 Pending = tuple[tuple[float, ...], str, int]
 NOTHING: Pending = ((), "", -1)
 
@@ -69,18 +69,18 @@ class Connected:
         self.newest = {Command: -1, Suggest: -1}
 
     def answers(self, back: int) -> int:
-        """Return the number of the last observation sent, or of one `back` before it."""
+        """Return the number of the observation `back` before the last one that was sent."""
         return max(0, max(self.sent, default=0) - back)
 
     def number(self, kind: type[Command | Suggest], ahead: int) -> tuple[int, bool]:
-        """Return the largest number so far plus `ahead`, and whether that is a new one."""
+        """Return the largest number so far plus `ahead`, and whether the sum is larger than it."""
         newest, number = self.newest[kind], max(0, self.newest[kind] + ahead)
         self.newest[kind] = max(newest, number)
         return number, number > newest
 
 
 class Robot(RuleBasedStateMachine):
-    """Four clients that send anything at any time, and a reference model of the rules."""
+    """Up to four clients that send any message at any time, and a reference model of the rules."""
 
     clients = Bundle("clients")
 
@@ -113,7 +113,7 @@ class Robot(RuleBasedStateMachine):
 
     @rule(client=consumes(clients), garbage=st.none() | st.binary(max_size=20))
     def leave(self, client: Connected, garbage: bytes | None) -> None:
-        """A client leaves, or sends invalid bytes; if it had control, the robot is disarmed."""
+        """A client disconnects or sends invalid bytes; if it had control, the robot is disarmed."""
         if garbage is not None:
             before = len(self.orders)
             with pytest.raises(LinkError):
@@ -138,7 +138,7 @@ class Robot(RuleBasedStateMachine):
 
     @rule(client=clients)
     def release(self, client: Connected) -> None:
-        """A client gives control back, whether or not it has it."""
+        """A client releases control, whether or not it has control."""
         self.send(client, Release())
         self.lose_control(client)
 
@@ -146,7 +146,7 @@ class Robot(RuleBasedStateMachine):
     def arm(self, client: Connected, by_holder: bool, emergency: int, back: int) -> None:
         """A client that sees the robot can arm it if a client has control.
 
-        It must be a person; or, if anyone may arm, a program in control without an emergency.
+        It must be a person, or, if anyone may arm, a program in control without an emergency.
         """
         client = self.actor(client, by_holder)
         answers = client.answers(back)
@@ -195,9 +195,9 @@ class Robot(RuleBasedStateMachine):
         scale: float,
         ttl_ms: int,
     ) -> None:
-        """A client sends a command: new, old, repeated, in answer to any number, or invalid.
+        """A client sends a command, which may be old, repeated, invalid, or answer any number.
 
-        Half of the commands are valid, and the holder's if there is one.
+        Half of the commands are valid, and sent by the holder if there is one.
         """
         if by_holder:
             ahead, back, values = 1, 0, (0.5, -1.0)
@@ -219,7 +219,7 @@ class Robot(RuleBasedStateMachine):
 
     @rule(client=clients, ahead=_aheads, back=_backs, values=_values)
     def suggest(self, client: Connected, ahead: int, back: int, values: tuple[float, ...]) -> None:
-        """A suggestion counts if its sender does not have control, and moves nothing."""
+        """A suggestion counts if its sender does not have control; it never moves the robot."""
         self.observe(client)
         answers, (seq, is_new) = client.answers(back), client.number(Suggest, ahead)
         assert not self.send(client, Suggest(seq=seq, answers=answers, values=values))
@@ -239,7 +239,7 @@ class Robot(RuleBasedStateMachine):
         ),
     )
     def ask_about_recordings(self, client: Connected, request: Any) -> None:
-        """A robot without a folder refuses requests about recordings, and nothing moves."""
+        """A robot without a folder for recordings refuses requests about them."""
         assert not self.send(client, request)
         assert not self.hub.recorder.on
 
@@ -256,7 +256,7 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def only_allowed_commands_reach_the_guard(self) -> None:
-        """The guard gets the model's commands, in order, with increasing lease and number."""
+        """The guard gets the commands of the model, in order, with increasing lease and number."""
         commands = [order for order in self.orders if order.kind == "command"]
         assert [(order.seq, order.values) for order in commands] == self.allowed
         numbers = [(order.session, order.seq) for order in commands]
@@ -264,19 +264,19 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def the_loss_of_control_disarms_the_robot(self) -> None:
-        """Each client that had control and left caused one order to disarm, with its reason."""
+        """Each loss of control by a disconnection or release causes one order to disarm."""
         lost = [o for o in self.orders if o.kind == "disarm" and not o.reason.endswith("disarmed")]
         assert len(lost) == self.stops
         assert all(order.reason for order in lost)
 
     @invariant()
     def only_invalid_commands_and_a_new_holder_halt_the_robot(self) -> None:
-        """Late, repeated and foreign commands do not halt it."""
+        """Late and repeated commands, and commands of other clients, do not halt the robot."""
         assert sum(order.kind == "halt" for order in self.orders) == self.halts
 
     @invariant()
     def the_expected_commands_are_shown(self) -> None:
-        """The holder, the command in force and the newest suggestion equal the model's."""
+        """Holder, current command and newest suggestion are the same as in the model."""
         held = None if self.holder is None else self.holder.session.client
         assert self.hub.holder is held
         shown, now_ns = self.hub.observation(Client(0), 1, None), self.clock.ns
@@ -288,7 +288,7 @@ class Robot(RuleBasedStateMachine):
         assert (shown.suggested, shown.suggested_by) == suggestion[:2]
 
     def actor(self, client: Connected, by_holder: bool) -> Connected:
-        """Return the client in control, which has just observed; or else another one."""
+        """Return the client in control, after an observation, if `by_holder`; else `client`."""
         if not by_holder or self.holder is None:
             return client
         self.observe(self.holder)

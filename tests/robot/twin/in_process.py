@@ -1,6 +1,6 @@
-"""A whole robot in this process: guard, drivers, pins and world.
+"""A complete robot in this process: guard, drivers, pins and world.
 
-The guard and the drivers are a served robot's. `step` gives the guard one command and
+The guard and the drivers are the same as in a served robot. `step` sends the guard a command and
 advances one control period. There is no link, no control lease and no deadline to miss; time
 advances only in steps, as with `--clock twin`.
 """
@@ -36,12 +36,12 @@ from shapechanger.robot.twin.ledger import TwinWiring
 from shapechanger.robot.twin.pin_board import PinBoard
 from shapechanger.robot.twin.rpc import BoardClient
 
-# Ticks in which the guard must arm, once all speed controllers listen.
+# Number of ticks within which the guard must arm, once all speed controllers are ready.
 _MAX_ARM_TICKS: Final = 10
 
 
 class _Clock(SteadyClock):
-    """Clock of a board in this process: `wait_until` of the board waits, `advance` moves it."""
+    """Clock of a board in this process; its `wait` calls `wait_until` of the board."""
 
     def __init__(self, board: LocalBoard) -> None:
         self._board = board
@@ -54,9 +54,9 @@ class _Clock(SteadyClock):
 
 
 class LocalBoard(BoardClient):
-    """A board with its world in this process, whose time only `advance` moves.
+    """A board with its world in this process; only `advance` advances its time.
 
-    It is the board of the only process that uses it, and that process's clock.
+    It serves only this process, and is also its clock.
 
     Attributes:
         t: Time, ns.
@@ -88,7 +88,7 @@ class LocalBoard(BoardClient):
                     self.watchers[pin](level, t)
 
     def wait_until(self, until_ns: int) -> bool:
-        """Refuse: the caller is the one who would have to advance the board."""
+        """Raise an error, because only the caller could advance the board."""
         raise RobotError("The time of a board in this process advances only by `advance`.")
 
     def pass_ns(self, ns: int) -> None:
@@ -108,17 +108,17 @@ class LocalBoard(BoardClient):
 
 
 class _Orders:
-    """Orders of this process and the newest state of the guard; see `DaemonChannel`."""
+    """Orders to the guard, and the newest state of the guard; see `DaemonChannel`."""
 
     lost = False
 
     def __init__(self) -> None:
         self.waiting: list[Order] = []
-        self.state = cast("GuardState", None)  # Until the guard's first round.
+        self.state = cast("GuardState", None)  # Set at the guard's first tick.
         self.refused = ""
 
     def filenos(self) -> list[int]:
-        """Return no descriptors: there is nothing to wait for."""
+        """Return no descriptors, because orders do not arrive through any."""
         return []
 
     def orders(self) -> tuple[list[Order], list[str]]:
@@ -126,7 +126,7 @@ class _Orders:
         return orders, []
 
     def send(self, state: GuardState) -> bool:
-        """Keep the newest state."""
+        """Store the newest state."""
         self.state = state
         self.refused = state.refused or self.refused
         return True
@@ -153,7 +153,7 @@ class InProcessRobot:
         card = card_of(profile, arming="anyone", clock="twin", pictures=pictures)
         self.welcome = Welcome(**msgspec.structs.asdict(card), session=1)
         self._guard: Guard | None = None
-        # Numbers images through all starts.
+        # The hub numbers the images, and is kept through all starts.
         clock = cast("SteadyClock", SimpleNamespace(now_ns=lambda: self.now_ns))
         self._hub = SessionHub(DaemonPlan(card=card), clock, self._send)
         self._client = Client(1)
@@ -173,10 +173,10 @@ class InProcessRobot:
         """Restart the robot, arm it, and return the first observation.
 
         Args:
-            place: Places the vehicle, before and after it is armed; None to leave it.
+            place: Function that places the vehicle, before and after arming; None to leave it.
         """
         if place is not None:
-            place()  # So that a moving vehicle does not roll on while the robot starts.
+            place()  # Otherwise a moving vehicle would roll on while the robot starts.
         self._start()
         # Speed controllers must have seen neutral for long enough.
         settings = (output.settings for output in self._plan.outputs)
@@ -184,12 +184,12 @@ class InProcessRobot:
         self.arm()
         if place is not None:
             place()
-            # A served robot sends its first observation after one period, too.
+            # Like a served robot, send the first observation after one period.
             self._advance(self._period_ns)
         return self._observe()
 
     def step(self, values: Sequence[float]) -> tuple[Observation, bool]:
-        """Act for one control period.
+        """Send a command, and advance one control period.
 
         Args:
             values: One value for each action.
@@ -207,7 +207,7 @@ class InProcessRobot:
     def arm(self) -> None:
         """Arm the robot, as a person does after a stop; raise RobotError if it does not arm."""
         orders = self._orders
-        refused, orders.refused = "", ""  # An earlier refusal is about something else.
+        refused, orders.refused = "", ""  # Discard the refusals of earlier orders.
         seen = orders.state.emergencies
         for _ in range(_MAX_ARM_TICKS):
             orders.waiting.append(Order("arm", issued_ns=self.now_ns, emergency=seen, person=True))
@@ -233,7 +233,7 @@ class InProcessRobot:
         self._advance(self._period_ns)
 
     def _send(self, order: Order) -> None:
-        # A robot in this process sees, with an image or without.
+        # The guard requires the time of a frame, also if this robot renders no image.
         self._orders.waiting.append(msgspec.structs.replace(order, frame_ns=self.now_ns))
 
     def _advance(self, ns: int) -> None:

@@ -1,4 +1,4 @@
-"""Requests to a board that is held up, and edges for a client that does not wait for them."""
+"""Requests to a board that replies late, and edges for a client that does not wait for them."""
 
 import contextlib
 import itertools
@@ -33,7 +33,7 @@ def _reply(number: int, result: object) -> bytes:
 
 
 def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
-    """Return a client and the board's end of its connection, which nobody reads."""
+    """Return a client, and the board's end of its connection, which is not read."""
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     path = str(folder / "board.socket")
     listening.bind(path)
@@ -55,8 +55,8 @@ def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
 
 
 @pytest.mark.parametrize("clock", ["steady", "granted"])
-def test_a_late_reply_is_waited_for_with_heartbeats(tmp_path: Path, clock: str) -> None:
-    """The board replies after five beats, which the guard has sent meanwhile."""
+def test_heartbeats_are_sent_while_a_reply_is_late(tmp_path: Path, clock: str) -> None:
+    """The board replies after five heartbeats of the guard."""
     client, board = _connected(tmp_path)
     beats = itertools.count(1)
 
@@ -72,8 +72,8 @@ def test_a_late_reply_is_waited_for_with_heartbeats(tmp_path: Path, clock: str) 
     assert next(beats) >= 6
 
 
-def test_requests_that_the_board_does_not_take_are_waited_for(tmp_path: Path) -> None:
-    """A full socket holds a request up until the board reads."""
+def test_a_request_waits_while_the_socket_is_full(tmp_path: Path) -> None:
+    """The request is sent when the board reads."""
     client, board = _connected(tmp_path)
     beats: list[int] = []
 
@@ -95,7 +95,7 @@ def test_requests_that_the_board_does_not_take_are_waited_for(tmp_path: Path) ->
 def test_a_board_that_never_replies_ends_the_heartbeats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The call fails without a beat, so the supervisor notices that the guard is silent."""
+    """The call fails without a heartbeat, so that the supervisor detects the silent guard."""
     monkeypatch.setattr(rpc, "_PATIENCE_S", 0.0)
     client, board = _connected(tmp_path)
     client.while_held_up = lambda: pytest.fail("a beat for a broken board")
@@ -110,7 +110,7 @@ def test_a_board_that_never_replies_ends_the_heartbeats(
 @settings(max_examples=25)
 @given(pins=st.lists(st.integers(4, 6), max_size=2000))
 def test_the_last_edge_of_each_input_is_kept(pins: list[int]) -> None:
-    """Few edges all arrive; of more than a message holds, at least the last of each input."""
+    """Up to 500 edges all arrive; of more edges, at least the last edge of each input arrives."""
     own, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     edges = [Edge(t, pin, t % 2) for t, pin in enumerate(pins)]
     with own, theirs:
@@ -119,7 +119,7 @@ def test_the_last_edge_of_each_input_is_kept(pins: list[int]) -> None:
             board.add_edge(edge)
         board.waits = 7
         board.wake(9, always=True)
-        board.wake(10, always=True)  # It no longer waits.
+        board.wake(10, always=True)  # No effect, because the client no longer waits.
         reply = msgspec.msgpack.decode(theirs.recv(MAX_MESSAGE), type=Reply)
         assert reply.id == 7
         awake: Awake = reply.decode(Awake)

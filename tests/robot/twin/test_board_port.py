@@ -23,7 +23,7 @@ _PULL = (0.5, *(0.0,) * 6)
 
 @pytest.fixture(scope="module")
 def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BoardAt]:
-    """A finger on the twin's clock."""
+    """The board of a finger, on the twin's clock."""
     place = finger_place(NOMINAL)
     with start_board(_PLAN, "twin", tmp_path_factory.mktemp("board"), place=place) as started:
         yield started
@@ -31,7 +31,7 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BoardAt]:
 
 @pytest.fixture
 def hardware(board: BoardAt) -> Iterator[TwinHardware]:
-    """Hardware of a guard connected to the board."""
+    """Hardware of a guard that is connected to the board."""
     made = connect(board.socket_path)
     yield made
     made.close()
@@ -40,7 +40,7 @@ def hardware(board: BoardAt) -> Iterator[TwinHardware]:
 def test_outputs_set_tensions_that_the_sensors_report(
     board: BoardAt, hardware: TwinHardware
 ) -> None:
-    """Commanded tensions appear in the readings, and a servo's fault as a failure."""
+    """Sensors read the commanded tensions; a servo's fault is reported as a failure."""
     outputs, sensors = OutputBank(_PLAN, hardware), Sensors(_PLAN, hardware)
     with Operator(board.socket_path) as operator:
         for _ in range(20):
@@ -48,7 +48,9 @@ def test_outputs_set_tensions_that_the_sensors_report(
             reading = sensors.read(operator.advance(0.01), 0.0)
         assert reading.failures == {}
         assert reading.quantities["FDP/tension"] == pytest.approx(8.0, abs=0.1)
-        assert operator.tensions()["FDP"] == pytest.approx(8.0, abs=1.5)  # Gears and speed.
+        assert operator.tensions()["FDP"] == pytest.approx(
+            8.0, abs=1.5
+        )  # Tolerance for friction and speed.
         outputs.release()
         operator.advance(0.3)
         assert operator.tensions()["FDP"] < 1.5
@@ -64,7 +66,7 @@ def test_outputs_set_tensions_that_the_sensors_report(
 
 
 def test_make_safe_sends_nothing_to_servos(board: BoardAt, hardware: TwinHardware) -> None:
-    """`make_safe` sends no packets to servos, so that their watchdogs can expire."""
+    """Without packets, the watchdogs of the servos expire."""
     outputs = OutputBank(_PLAN, hardware)
     with Operator(board.socket_path) as operator:
         for _ in range(10):

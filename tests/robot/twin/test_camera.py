@@ -1,4 +1,4 @@
-"""Worlds for the vehicle of a twin, and its front camera."""
+"""Worlds and front camera of a twin."""
 
 import os
 import re
@@ -37,7 +37,7 @@ def _pictures(data: bytes) -> list[tuple[int, bytes]]:
     return [(int(one[1]), one[0]) for one in found]
 
 
-def test_frames_carry_their_capture_time(tmp_path: Path) -> None:
+def test_frames_contain_their_capture_time(tmp_path: Path) -> None:
     with (
         start_board(CAR, "twin", tmp_path, _CAMERA) as board,
         Operator(board.socket_path) as operator,
@@ -100,7 +100,7 @@ def test_the_room_does_not_import_mujoco() -> None:
     assert run.stdout.endswith("run `pip install 'shapechanger[sim]'`.\n")
 
 
-def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
+def test_an_operator_replaces_the_course(tmp_path: Path) -> None:
     with (
         start_board(CAR, "twin", tmp_path, seed=4, place=_CORRIDOR) as board,
         Operator(board.socket_path) as operator,

@@ -1,4 +1,4 @@
-"""Twin time advances only on request and waits for all participants."""
+"""Twin time: it advances only on request, and waits for all participants."""
 
 import asyncio
 from pathlib import Path
@@ -19,7 +19,7 @@ _WAITER = """
 import sys
 from shapechanger.robot.twin.hardware import connect
 clock = connect(sys.argv[1]).clock
-clock.wait([], 2**62, 0.0)  # Join the clock.
+clock.wait([], 2**62, 0.0)  # Become a participant.
 print("waits", flush=True)
 while True:
     clock.wait([], 2**62, 0.2)
@@ -46,7 +46,7 @@ def test_a_wait_without_a_grant_returns(tmp_path: Path) -> None:
 
 
 def test_sleep_advances_the_clock(tmp_path: Path) -> None:
-    """Sleeps end on time and overlap, and return the capture time of the newest frame."""
+    """Sleeps may overlap, end on time, and return the capture time of the newest frame."""
     with start_board(CAR, "twin", tmp_path, CameraPlan("pipe", fps=20.0)) as board:
         hardware = connect(board.socket_path)
         clock = hardware.clock

@@ -1,4 +1,4 @@
-"""The ledger, including damaged files, and the oracle that finds violations in it."""
+"""The ledger, also if it is damaged, and `unauthorised`, which finds violations in it."""
 
 import math
 from dataclasses import replace
@@ -30,7 +30,7 @@ def _pin(ms: float, pin: int, duty: float) -> Transition:
 
 
 def test_driving_without_permission_is_found() -> None:
-    """A level that never changes lasts to infinity; steering is allowed without a command."""
+    """An output that never returns to rest moves to infinity; steering needs no permission."""
     for pin, sign in ((22, 1), (27, -1)):
         ledger = [_pin(10, pin, 0.5), _pin(11, pin, 0.0)]
         assert unauthorised(ledger, _NO_ONE_SHOT, [(9 * _MS, 250 * _MS)]) == []
@@ -39,7 +39,7 @@ def test_driving_without_permission_is_found() -> None:
     found = unauthorised([_pin(10, 22, 0.5)], _NO_ONE_SHOT, [(10 * _MS, 260 * _MS)])
     assert found[0][1:3] == (260 * _MS, math.inf)
     assert time_to_rest([_pin(10, 22, 0.5)], _NO_ONE_SHOT, 10 * _MS) == math.inf
-    # Also below the duty at which the motor starts to move.
+    # A duty below the start of the motor's motion counts as driving.
     plan = replace(CAR, outputs=(replace(DRIVE, settings={**DRIVE.settings, "start": 0.3}), STEER))
     assert unauthorised([_pin(10, 22, 0.01)], TwinWiring(plan, None), [])
     assert unauthorised([_pin(10, 17, 1.0)], _NO_ONE_SHOT, []) == []
@@ -52,14 +52,14 @@ def test_time_to_rest_ends_at_the_last_stop() -> None:
 
 
 def test_the_one_shot_stops_a_frozen_pin() -> None:
-    """With the one-shot on the enable line, a frozen pin drives for at most 100 ms."""
+    """With a one-shot on the enable line, a pin that stays high drives for at most 100 ms."""
     toggles = [_pin(ms, 25, float(ms // 10 % 2)) for ms in range(10, 210, 10)]
     gone = [Transition(t=205 * _MS, kind="gone", pid=1), _pin(205, 22, 1.0), _pin(205, 25, 0.0)]
     ledger = sorted([*toggles, _pin(15, 22, 0.5), *gone], key=lambda line: line.t)
     assert time_to_rest(ledger, TwinWiring(CAR, 100.0), 205 * _MS) == pytest.approx(0.09, abs=0.006)
     for wiring in (_NO_ONE_SHOT, TwinWiring(plan=replace(CAR, enable_pin=None))):
         assert time_to_rest(ledger, wiring, 205 * _MS) == math.inf
-    # Without toggling the motors have no power.
+    # If the enable line does not toggle, the motors have no power.
     assert propelled([_pin(10, 22, 0.5)], TwinWiring(CAR, 100.0)) == []
 
 
@@ -95,10 +95,10 @@ _TIMES = st.integers(0, 2000)
     duties=st.lists(st.tuples(_TIMES, st.sampled_from([0.0, 0.3, 1.0])), max_size=20),
     arrivals=st.lists(_TIMES, max_size=20),
 )
-def test_the_oracle_agrees_with_a_brute_force_check(
+def test_violations_agree_with_a_brute_force_check(
     duties: list[tuple[int, float]], arrivals: list[int]
 ) -> None:
-    """At each sampled instant, the oracle reports motion without a command, and nothing else."""
+    """At each sampled time, `unauthorised` reports exactly the motion without permission."""
     ledger = [_pin(ms, 22, duty) for ms, duty in sorted(duties, key=lambda one: one[0])]
     wiring = TwinWiring(replace(CAR, actions=ACTIONS), None)
     permitted = [(ms * _MS, (ms + 250) * _MS) for ms in arrivals]

@@ -56,7 +56,7 @@ def test_pins_of_a_killed_process_keep_their_level(
 
 
 def test_a_clean_exit_leaves_motors_low_and_keeps_plain_outputs(tmp_path: Path) -> None:
-    """Pins are as on a Raspberry Pi, and the ledger records no dead process."""
+    """Pins behave as on a Raspberry Pi; the ledger does not report a dead process."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "0.7") as robot:
             robot.communicate("")
@@ -65,7 +65,7 @@ def test_a_clean_exit_leaves_motors_low_and_keeps_plain_outputs(tmp_path: Path) 
 
 
 def test_an_active_low_output_stays_high_when_opened_and_closed(tmp_path: Path) -> None:
-    """As on a Pi: a low OE input of a PCA9685 would enable stale pulses."""
+    """A low output-enable input of a PCA9685 would enable old pulses."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
         for _ in range(2):
@@ -78,7 +78,7 @@ def test_an_active_low_output_stays_high_when_opened_and_closed(tmp_path: Path) 
 
 
 def test_pwm_is_rounded_down() -> None:
-    """As gpiozero over lgpio, duty is truncated to whole percent and frequency to whole hertz."""
+    """Like gpiozero with lgpio, duty is truncated to whole percent, frequency to whole hertz."""
     board = LocalBoard(TwinWiring(CAR), DrivingWorld((), (8, 6), seed=0))
     device = PWMOutputDevice(18, frequency=50.9, pin_factory=board.hardware.pin_factory())
     for asked, done in ((0.58, 0.57), (0.076, 0.07), (0.5, 0.5), (1.0, 1.0)):
@@ -134,7 +134,7 @@ sys.stdin.read()
 
 
 def test_pulses_continue_after_the_process_dies(tmp_path: Path) -> None:
-    """A PCA9685 pulses without its process; its output-enable pin, pulled up, stops the pulses."""
+    """A PCA9685 keeps sending pulses; the pull-up of its output-enable pin ends them."""
     with (
         start_board(_SERVO_CAR, "twin", tmp_path) as board,
         Operator(board.socket_path) as operator,

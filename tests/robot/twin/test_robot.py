@@ -1,4 +1,4 @@
-"""What is left of a robot whose link is lost."""
+"""Log and folder of a robot whose link is lost."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ _WAIT = "import signal; signal.pause()"
 
 @pytest.mark.parametrize("error", [LinkError("It is lost."), ValueError("Not of the link.")])
 def test_a_lost_link_keeps_the_end_of_the_log(tmp_path: Path, error: Exception) -> None:
-    """Closing removes a temporary folder, and with it the log."""
+    """The error has the end of the log, because closing removes a temporary folder and its log."""
     folder = tmp_path / "robot"
     folder.mkdir()
     (folder / "ready.json").write_text('{"port": 1, "fingerprint": ""}')

@@ -1,4 +1,4 @@
-"""The robot's own drivers on the twin's pins and chips, and back from levels to values."""
+"""The robot's drivers on the twin's pins and chips, and the values computed from levels."""
 
 import math
 from collections.abc import Iterator
@@ -73,7 +73,7 @@ def test_joint_encoders_measure_the_angles() -> None:
 
 
 def test_the_distance_is_measured() -> None:
-    """The echo gives the distance; an operator can override it; a dead sensor raises."""
+    """The echo gives the distance, which an operator can override; a dead sensor is an error."""
     with _rig(_DISTANCE) as rig:
         truth = rig.operator.where().distance_m
         assert rig.advance(0.2)["distance"] == pytest.approx(min(truth, 3.0), abs=0.01)
@@ -130,15 +130,15 @@ def test_the_wiring_inverts_each_driver(kind: str) -> None:
     board.hardware.close()
 
 
-def test_only_outputs_with_throttle_propel() -> None:
-    """The mix decides which outputs propel, not their names."""
+def test_outputs_propel_if_an_action_that_propels_is_in_their_mix() -> None:
+    """The names of outputs have no effect."""
     assert TwinWiring(CAR).propelling == ("drive",)
     swapped = (replace(DRIVE, mix={"steering": 1.0}), replace(STEER, mix={"throttle": -0.5}))
     assert TwinWiring(replace(CAR, outputs=swapped)).propelling == ("steer",)
 
 
-def test_wrong_pins_turn_the_wrong_motor() -> None:
-    """Wiring is independent of the served profile: swapped pins steer instead of driving."""
+def test_swapped_pins_move_the_wrong_output() -> None:
+    """The twin's wiring is independent of the served profile: the throttle steers."""
     levels = Levels()
     levels.drive(17, 0.8, 0)
     read = TwinWiring(CAR, None).read(levels, 0)

@@ -1,4 +1,4 @@
-"""Rig of a finger: the real guard and drivers on a twin, one exam for both families of servos."""
+"""Rig of a finger: real guard and drivers on a twin, with each of both families of servos."""
 
 import contextlib
 import re
@@ -67,7 +67,7 @@ def bench(family: str) -> Iterator[_Bench]:
 
 @pytest.fixture
 def tensed() -> Iterator[_Bench]:
-    """The shipped finger, which controls tensions."""
+    """The armed rig of the shipped finger, whose commands are tensions."""
     made = _Bench(load_profile(find_profile("finger")))
     yield made
     made.robot.close()
@@ -79,7 +79,7 @@ def test_no_servo_pulls_before_the_first_command(bench: _Bench) -> None:
 
 
 def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
-    """Flexors go to their lengths, with at most their largest tension."""
+    """Flexors reach their commanded lengths with at most their largest tension."""
     bench.drive(_FLEX, 100)
     assert bench.seen.stop_reason == ""
     assert bench.state("FDP/length") < -0.008
@@ -91,7 +91,7 @@ def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
 
 
 def test_rest_is_the_pretension(bench: _Bench, family: str) -> None:
-    """At the command 0 each servo pulls with its pretension, to one count of its goal."""
+    """At the command 0, each servo pulls with its pretension, within one count of its goal."""
     bench.drive(_FLEX, 25)
     bench.drive(_REST, 25)
     pretension = 1.0 if family == "Dynamixel" else 6.0
@@ -101,7 +101,7 @@ def test_rest_is_the_pretension(bench: _Bench, family: str) -> None:
 
 
 def test_an_emergency_stop_ends_without_torque(bench: _Bench) -> None:
-    """The tensions fall to the pretension in 0.3 s, and then no servo has torque."""
+    """Tensions fall to the pretension within 0.3 s; then all servos have no torque."""
     bench.drive(_FLEX, 25)
     assert min(bench.pulls()) > 0.0
     bench.robot._orders.waiting.append(Order("emergency", issued_ns=bench.robot.now_ns))
@@ -111,7 +111,7 @@ def test_an_emergency_stop_ends_without_torque(bench: _Bench) -> None:
 
 
 def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench, family: str) -> None:
-    """Watchdogs of Dynamixel servos stop them; Feetech servos lose their power."""
+    """Dynamixel servos are stopped by their watchdogs; Feetech servos lose their power."""
     bench.drive(_FLEX, 25)
     bench.advance_without_guard(80)
     assert min(bench.pulls()) > 0.0
@@ -132,7 +132,7 @@ def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench, family: str
     ],
 )
 def test_a_failed_servo_stops_all(bench: _Bench, family: str, how: str, text: str) -> None:
-    """All servos let go, also one that hears nothing, and stay so until a person has armed."""
+    """All servos release, also one that gets no packets, until a person has armed the robot."""
     bench.drive(_FLEX, 25)
     bench.rig.break_servo("FDS", how)
     bench.drive(_FLEX, 80)
@@ -156,7 +156,7 @@ def test_a_failed_servo_stops_all(bench: _Bench, family: str, how: str, text: st
 
 
 def test_arming_does_not_keep_a_deaf_servo_pulling(bench: _Bench) -> None:
-    """Whoever insists on arming while a servo hears nothing does not keep its power on."""
+    """Repeated attempts to arm must not keep the servo's power on."""
     bench.drive(_FLEX, 25)
     bench.rig.break_servo("FDS", "deaf")
     for _ in range(10):
@@ -174,7 +174,7 @@ def test_arming_does_not_keep_a_deaf_servo_pulling(bench: _Bench) -> None:
 
 
 def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
-    """After a crash the enable line falls, whatever the servos do; nothing is sent to them."""
+    """After a crash, `make_safe` sets the enable line low, and sends no packets to servos."""
     plan = read(finger_text("Feetech")).guard_plan()
     board = LocalBoard(TwinWiring(plan), FingerWorld(NOMINAL, seed=3))
     switches = Switches(plan, board.hardware)
@@ -192,12 +192,12 @@ def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
 
 
 def test_a_missing_magnet_releases_all_tendons(tensed: _Bench) -> None:
-    """Tendons go to the pretension, then to zero, and stay released until a person arms."""
+    """Tendons go to the pretension, then to zero, and stay released until a person has armed."""
     tensed.drive(_BENT, 25)
     (joints,) = tensed.robot.pins.of_kind(SimulatedJoints)
     joints.set_magnet("PIP_flexion", "gone")
     tensed.drive(_BENT, 2)
-    assert tensed.seen.stop_reason == ""  # A short loss only marks the joint absent.
+    assert tensed.seen.stop_reason == ""  # After a short loss, only the joint's reading is absent.
     assert tensed.seen.sources["PIP_flexion/angle"] == "absent"
     tensed.drive(_BENT, 2)
     assert "The encoder of PIP_flexion, on channel 2, detects no magnet." in tensed.seen.stop_reason

@@ -13,7 +13,7 @@ from shapechanger.robot.twin.room import RADIUS, ROOM_LENGTH, ROOM_WIDTH, Drivin
 
 _SIZE = (160, 120)
 
-# Outputs that drive each vehicle ahead, and outputs that turn it left.
+# Outputs that drive each vehicle straight ahead, and outputs that turn it left.
 _VEHICLES = {
     "car": ({"wheels": 1.0, "steering": 0.0}, {"wheels": 0.5, "steering": -1.0}),
     "tank": ({"left track": 1.0, "right track": 1.0}, {"left track": -0.5, "right track": 0.5}),
@@ -42,7 +42,7 @@ def _driven(kind: str, outputs: dict[str, float], seconds: float) -> DrivingWorl
 
 @pytest.mark.parametrize("kind", _VEHICLES)
 def test_ahead_is_along_the_heading_and_left_is_counter_clockwise(kind: str) -> None:
-    """Outputs ahead do not turn; mirrored outputs turn right by the same angle; negated go back."""
+    """Mirrored outputs turn right by the same angle; negated outputs drive backward."""
     ahead, left = _VEHICLES[kind]
     start = _driven(kind, {}, 0.0).inputs().pose
     seen = _driven(kind, ahead, 0.8).inputs()

@@ -1,4 +1,4 @@
-"""Checks that drive a robot, on a twin."""
+"""Checks that drive a robot; the robot runs on a twin."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def _checked(folder: Path, text: str, wired: str = "") -> dict[str, Finding]:
 
 
 def test_an_encoder_that_counts_backward_is_found(tmp_path: Path) -> None:
-    """Swapped encoder pins would reward reversing. The robot passes every other check."""
+    """With swapped encoder pins, only the check "drives" is bad."""
     swapped = changed("a = 5\nb = 6\n", "a = 6\nb = 5\n")
     checks = _checked(tmp_path, swapped, wired=CAR)
     assert [name for name, check in checks.items() if check.level != "good"] == ["drives"]
@@ -34,8 +34,8 @@ def test_an_encoder_that_counts_backward_is_found(tmp_path: Path) -> None:
 
 
 def test_without_an_encoder_checks_are_unknown(tmp_path: Path) -> None:
-    """Unmeasured checks are "unknown", while stopping is measured at the outputs."""
+    """Without an encoder, checks of the wheels are "unknown"; stops are measured at the outputs."""
     checks = _checked(tmp_path, BLIND_CAR)
     assert (checks["drives"].level, checks["wheels stand"].level) == ("unknown", "unknown")
-    # Do not check the time, since the test machine may be busy.
+    # The time is not checked, because the test machine may be busy.
     assert checks["stops by silence"].level != "unknown"

@@ -65,10 +65,10 @@ _VOID = TrialResult(0.0, 270.0, False)
         ([_result(math.nan)], "unknown", "Not measured: join the motor's pin to a free"),
     ],
 )
-def test_a_fault_is_a_check(
+def test_the_finding_of_a_fault(
     monkeypatch: pytest.MonkeyPatch, results: list[Any], level: str, part: str
 ) -> None:
-    """A check passes only if each stop was in time, and was measured or seen."""
+    """A finding is good only if each stop was in time, and was measured or seen by a person."""
     monkeypatch.setattr(module, "_try", MagicMock(side_effect=results))
     trials = sum(result is not _VOID for result in results) or 1
     found, sentence = fault_finding(Bench(shipped("car")), FAULTS["driver killed"], trials)
@@ -77,7 +77,7 @@ def test_a_fault_is_a_check(
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A bench on pins without a robot, driver and network; `events` has its calls."""
+    """A bench on pins with fakes of robot, driver and network; `events` has their calls."""
     events: list[str] = []
     robot: Any = SimpleNamespace(port=1, known_at=lambda _: None)
     robot.client = lambda **_: nullcontext(MagicMock())
@@ -103,7 +103,7 @@ def _fault(bench: Any) -> Fault:
 
 
 def test_a_person_is_asked_before_the_pins_are_made_safe(bench: Any) -> None:
-    """Making them safe would also put out an LED that stayed lit."""
+    """`make_safe` would also switch off an LED that had stayed lit."""
 
     def ask(question: str) -> bool:
         bench.events.append(question)
@@ -120,7 +120,7 @@ def test_a_person_is_asked_before_the_pins_are_made_safe(bench: Any) -> None:
 
 
 def test_pins_that_stay_driven_are_bad(bench: Any) -> None:
-    """The finding names them, and the next fault is tried all the same."""
+    """The finding names these pins, and the next fault is still tried."""
     bench.close = MagicMock(side_effect=[["GPIO22 is stuck."], []])
     found = fault_finding(bench, _fault(bench), 1)
     assert found == ("bad", "Not everything is at rest: GPIO22 is stuck.")
@@ -131,7 +131,7 @@ def test_pins_that_stay_driven_are_bad(bench: Any) -> None:
 def test_the_bench_of_a_twin(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """LEDs, checks and faults run as on a Pi, judged by the ledger, and end in one report."""
+    """LEDs, checks and faults run as on a Pi, are evaluated from the ledger, and are reported."""
     monkeypatch.chdir(tmp_path)
     # A busy machine may be late, which this test does not check.
     with contextlib.suppress(SystemExit):
