@@ -1,4 +1,4 @@
-"""Fixtures of the commands' tests."""
+"""Fixtures for tests of commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands that run in this process."""
+"""Helper to run commands in this process."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from shapechanger.cli import main
 
 
 class Printed(NamedTuple):
-    """What a command has printed."""
+    """Output and errors of a command."""
 
     out: str
     err: str
 
 
 class Cli:
-    """The command `shapechanger`, or a group of it.
+    """The command `shapechanger`, or a group of its commands.
 
     Args:
-        capsys: What has been printed.
+        capsys: Fixture that captures the output.
         group: The first words of each command.
     """
 
@@ -45,7 +45,7 @@ class Cli:
         return self.ended(0, *words).out
 
     def refused(self, *words: object) -> str:
-        """Return the error of a command, which is one sentence, after exit code 2."""
+        """Return the error of a command that must end with exit code 2; it must be one sentence."""
         message = self.ended(2, *words).err
         assert message.startswith("error: ")
         assert message.count("\n") == 1, message

@@ -23,7 +23,7 @@ REQUIREMENTS = (
 
 
 def findings(installed: dict[str, str], dev: Path = Path("/nowhere")) -> dict[str, Finding]:
-    """Return the results of a machine with some packages, by the names of their checks."""
+    """Return the findings for a machine with some packages, keyed by check."""
 
     def version_of(package: str) -> str:
         if package not in installed:
@@ -57,7 +57,7 @@ def test_pins_that_may_not_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_renderer_that_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A crash of the driver ends its own process only."""
+    """A crash of the OpenGL driver ends only the process that renders."""
     died = SimpleNamespace(returncode=-11, stdout="", stderr="")
     monkeypatch.setattr(subprocess, "run", lambda *command, **options: died)
     assert findings({"mujoco": "4.0.0"})["images"] == Finding("images", "bad", "exit status -11")
@@ -77,7 +77,7 @@ def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
     assert not any("BAD" in line for line in lines)
 
 
-def test_something_to_mend_is_an_exit_status(
+def test_a_bad_finding_sets_the_exit_status(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     broken: list[Any] = [Finding("core", "bad", "Gone.")]

@@ -23,7 +23,7 @@ def test_list_names_every_env(cli: Cli) -> None:
 
 
 def test_show_prints_the_layout_as_a_table(cli: Cli) -> None:
-    """Names, units, ranges, elements and gains."""
+    """The table has names, units, ranges, elements and gains."""
     text = cli.output("envs", "show", "BigInvertedPendulum")
     for word in ("hinge/velocity", "rad/s", "-1.571", "joint slider", "100 N", "slide/motor"):
         assert word in text
@@ -79,7 +79,7 @@ def test_the_bodies_of_odrl_are_one_row(cli: Cli) -> None:
 
 
 def test_bodies_of_odrl_have_short_names(cli: Cli) -> None:
-    """With a slash or a hyphen; issue 8 of ODRL is refused, and a typing mistake named."""
+    """Names have a slash or a hyphen; a body without a change (ODRL, issue 8) is refused."""
     text = cli.output("envs", "compare", "odrl/hopper", "odrl-hopper-friction-0.5")
     assert "floor + foot_geom: contact friction 2 each -> 1 each (x0.5)" in text
     names = ("odrl/hopper-friction-0.1", "odrl/hopper-friction-0.5")
@@ -90,7 +90,7 @@ def test_bodies_of_odrl_have_short_names(cli: Cli) -> None:
 
 
 def test_a_file_is_an_env(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the built-in task, a task of a module in its folder, a body, and options."""
+    """A file may have the built-in task or a task from a module, a body, and options."""
     (tmp_path / "dog.xml").write_text(DOG)
     (tmp_path / "tricks.py").write_text(
         "class Sit:\n    observe = ['back/angle']\n"

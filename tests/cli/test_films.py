@@ -25,12 +25,12 @@ pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
 @pytest.fixture(autouse=True)
 def short_films(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Films of half a second."""
+    """Limit films to half a second."""
     monkeypatch.setattr("shapechanger.envs.study_films._FILM_S", 0.5)
 
 
 def test_every_policy_is_filmed(tmp_path: Path) -> None:
-    """The source in its own body, each arm in the target, and scratch last; edges are smooth."""
+    """The film shows the source in its body, each arm in the target, and scratch last."""
     plan = tiny_plan(steps=32, source_steps=32)
     study = run_study(plan, tmp_path / "study", executor=Serial())
     film = tmp_path / "film.mp4"
@@ -49,7 +49,7 @@ def test_every_policy_is_filmed(tmp_path: Path) -> None:
 
 
 def test_a_given_source_policy_is_filmed(tmp_path: Path) -> None:
-    """A study that was given its source policy stores no copy of it, so its file is passed."""
+    """A study with a given source policy stores no copy of it, so the policy's file is passed."""
     policy = reference_policy("shapechanger/SmallInvertedPendulum-v1")
     short = {"n_envs": 2, "n_steps": 16, "batch_size": 16, "eval_every": 32, "eval_episodes": 1}
     _, settings = resolve_learner("ppo-balance", short)
@@ -64,7 +64,7 @@ def test_a_given_source_policy_is_filmed(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_vehicles_are_filmed_from_outside(tmp_path: Path) -> None:
-    """Envs of vehicles render what the robot sees, not the robot."""
+    """Envs of vehicles render the robot's camera image, so films use another camera."""
     source, target = driven(env_ref("CarWaypoint")), driven(env_ref("TankWaypoint"))
     whole = cast("Any", learner_settings("waypoint")).clone
     small = {"channels": (4, 8), "features": 8, "batch": 8}

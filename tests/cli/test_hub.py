@@ -1,4 +1,4 @@
-"""`policies push | pull` and `demos push | pull`, as processes, against a local Hub."""
+"""`policies push | pull` and `demos push | pull` with a fake Hub on this machine."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def hub(served: FakeHub) -> FakeHub:
 
 @pytest.fixture(scope="module")
 def environment(served: FakeHub, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Variables of a process that uses this Hub, and no login of the machine."""
+    """Environment variables of a process that uses the fake Hub, without the machine's login."""
     inherited = {key: value for key, value in os.environ.items() if not key.startswith("HF_")}
     return inherited | {
         "HF_ENDPOINT": served.address,
@@ -104,7 +104,7 @@ def run(environment: dict[str, str]) -> Iterator[Run]:
 
 
 def refused(answer: tuple[int, str, str]) -> str:
-    """Return the sentence of a refusal."""
+    """Check that a command has refused its input, and return its error."""
     code, output, errors = answer
     assert code == 2, errors
     assert output == ""
@@ -116,7 +116,7 @@ def refused(answer: tuple[int, str, str]) -> str:
 
 @pytest.mark.parametrize("file", [POLICY, CLONES["car"]])
 def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, file: Path) -> None:
-    """The file comes back byte by byte; the card describes it and how to get it."""
+    """The pulled file is identical; the card describes the policy and how to pull it."""
     code, output, errors = run("policies", "push", file, "ada/reach")
     assert (code, errors) == (0, "")
     assert f"{hub.address}/ada/reach/commit/" in output
@@ -127,7 +127,7 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
     listed = json.loads(repository.files["shapechanger.json"])["files"]["policy.safetensors"]
     for part in ("library_name: shapechanger", "**Action**", listed["sha256"], "policies pull"):
         assert part in card
-    # Other files are neither read nor fetched.
+    # Other files of the repository are not downloaded.
     first = next(iter(repository.commits))
     repository.commit(repository.files | {"evil.pkl": pickle.dumps(print)})
     out = tmp_path / "pulled.safetensors"
@@ -142,7 +142,7 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
 
 
 def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path) -> None:
-    """Episodes come back unchanged, including dropped steps; a second push replaces the first."""
+    """Pulled episodes are identical, with dropped steps; a second push replaces the first."""
     edit(drive(tmp_path / "data", 5), Drop(1, 2, "bad"))
     second = drive(tmp_path / "data", 3)
     assert run("demos", "push", tmp_path / "data", "ada/drive", "--public")[0] == 0
@@ -164,7 +164,7 @@ def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: 
 
 
 def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
-    """Unknown names, revisions and repositories; no token, a wrong one, and one that only reads."""
+    """Unknown names, revisions and repositories, and missing and unsuitable tokens, are refused."""
     out = tmp_path / "out"
     pull = ("policies", "pull", "ada/none", "--out", out)
     push = ("policies", "push", POLICY, "ada/new")
@@ -172,7 +172,7 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     assert "hf auth login" in refused(run(*pull, token=""))
     assert "requires a login" in refused(run(*push, token=""))
     assert "forbids this for ada/new" in refused(run(*push, token=READER))
-    # A token that no header can carry must not be part of the error.
+    # A token that is invalid in an HTTP header must not be part of the error.
     answer = run(*push, token="hf_söcret")
     assert "söcret" not in refused(answer)
     for name in ("ant", "https://huggingface.co/ada/ant", "ada/-ant"):
@@ -231,7 +231,7 @@ def test_files_that_are_refused(
     listed: bytes,
     message: str,
 ) -> None:
-    """Sizes, hashes, names and kinds are checked; nothing is left behind."""
+    """Sizes, hashes, names and kinds are checked; no file is left."""
     kind = "models" if command == "policies" else "datasets"
     repository = hub.repositories[f"{kind}/ada/x"] = Repository()
     repository.commit({**held, "shapechanger.json": listed})
@@ -308,7 +308,7 @@ class FakeHub(ThreadingHTTPServer):
     Attributes:
         repositories: Repositories by their type and name, such as "models/ada/ant".
         requests: Method and path of each request.
-        cut: Number of bytes after which transfers of a file end, by its name.
+        cut: Number of bytes after which transfers of a file end, keyed by the file's name.
         stalled: Names of files whose transfers stop half-way until the server ends.
         stalling: Whether such a transfer is under way.
     """
@@ -380,7 +380,7 @@ class _Handler(BaseHTTPRequestHandler):
         return False
 
     def _repository(self, name: str) -> Repository | None:
-        """Return a repository that the client may see; else answer like the Hub."""
+        """Return a repository, or send an error and return None if the client may not see it."""
         found = self.server.repositories.get(name)
         if self._token not in {"", OWNER, READER}:
             self._send(401, {"error": "no"}, X_Error_Message="Invalid credentials in"

@@ -29,7 +29,7 @@ sys.meta_path.insert(0, CtrlC())
 
 @pytest.mark.system
 @pytest.mark.parametrize("name", ["tyro", "mujoco"])
-def test_ctrl_c_while_loading_is_one_word(name: str) -> None:
+def test_ctrl_c_while_loading_prints_one_word(name: str) -> None:
     code = INTERRUPTED.format(name=name) + COMMAND.format(arguments=["envs", "show", "Ant"])
     done = run_python(code)
     assert done.returncode == 130
@@ -99,7 +99,7 @@ def test_a_missing_pygame_gives_one_sentence(tmp_path: os.PathLike[str]) -> None
 @pytest.mark.system
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Here no disk is always full.")
 def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
-    """No traceback, neither on write nor at interpreter exit."""
+    """There is no traceback, neither on write nor at the exit of the interpreter."""
     code = COMMAND.format(arguments=["robot", "check", "car", "--wiring", "--port", "0"])
     with open("/dev/full", "w") as full:
         done = subprocess.run(

@@ -38,7 +38,7 @@ gym.register("Bare-v0", Bare)
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder, which an installed program does not search for modules."""
+    """The current folder; Python's path does not contain it, as for an installed program."""
     found = [path for path in sys.path if path not in ("", str(Path.cwd()))]
     monkeypatch.setattr(sys, "path", found)
     monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
@@ -77,15 +77,15 @@ def test_a_module_of_the_current_folder_is_found(
     assert words in cli.refused(*arguments)
 
 
-def test_names_of_ours_leave_the_path_alone(folder: Path, cli: Cli) -> None:
-    """A module next to a policy cannot be imported by naming one of our learners."""
+def test_names_of_shipped_learners_do_not_change_the_path(folder: Path, cli: Cli) -> None:
+    """A shipped learner's name must not allow imports from the current folder."""
     cli.refused("train", "Ant", "--learner", "ppo-run", "--steps", "10")
     assert str(folder) not in sys.path
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a project called `cliown` and a suite with one finished study of it."""
+    """A folder with a project called `cliown`, and a suite of it with a finished study."""
     project = tmp_path_factory.mktemp("project")
     write_project(project, "cliown")
     with pytest.MonkeyPatch.context() as patch:
@@ -110,8 +110,10 @@ def project(done: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 _POLICY = "suite/a-to-b/runs/scratch-0/policy.safetensors"
 
 
-def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(project: Path, cli: Cli) -> None:
-    """The task is found as `train` finds it; an edited robot or task is refused and named."""
+def test_a_policy_is_evaluated_in_its_robot_until_the_robot_changes(
+    project: Path, cli: Cli
+) -> None:
+    """The task is found as in `train`; an edited robot or task is refused and named."""
     evaluate = ("policies", "evaluate", _POLICY, "--episodes", "1")
     assert "return" in cli.output(*evaluate)
     assert "cliown_task.py" in cli.output("policies", "show", _POLICY)
@@ -133,7 +135,7 @@ def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(project: Path
 def test_a_suite_is_watched_with_own_methods(
     project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
-    """From another folder, the message names the folder to go to, and does not say to delete."""
+    """From another folder, the error asks to change the folder, and not to delete the suite."""
     assert "a-to-b" in cli.output("suite", "watch", "suite")
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(project)])
     monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})

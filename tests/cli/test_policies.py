@@ -30,7 +30,7 @@ def _zip(path: Path, env: str = "shapechanger/InvertedPendulum-v1", **arguments:
 
 
 def _convert(folder: Path, env: str = "InvertedPendulum") -> tuple[object, ...]:
-    """Return the words of the command that converts this zip."""
+    """Return the arguments of the command that converts the zip of `_zip`."""
     return "policies", "convert", folder / "mine.zip", env
 
 
@@ -50,7 +50,7 @@ def test_policies_are_shown_and_listed(cli: Cli) -> None:
 def test_a_zip_of_stable_baselines3_is_converted(
     kind: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
-    """The same actions, from a file that cannot run code and says which command wrote it."""
+    """The converted file gives the same actions, cannot run code, and names its command."""
     env = gym.make("shapechanger/InvertedPendulum-v1")
     networks = {"net_arch": [8, 8] if kind is PPO else {"pi": [8, 8], "qf": [8, 8]}}
     few = {"train_freq": 4, "buffer_size": 100}
@@ -136,7 +136,7 @@ def test_a_folder_is_listed(trained: Path, cli: Cli) -> None:
 
 @pytest.mark.gl
 def test_clones_are_evaluated_and_played(tmp_path: Path, cli: Cli) -> None:
-    """In the vehicle that they learned in, and in another; not in a body with other actions."""
+    """A clone also acts in another vehicle, but not in a body with other actions."""
     film = ("--max-steps", 3, "--out", tmp_path / "film.mp4")
     for env in ([], ["--env", "Tank"]):
         assert "in 3 steps" in cli.output("policies", "play", CLONES["car"], *film, *env)
@@ -169,10 +169,10 @@ def build(envs, seed):
 """
 
 
-def test_a_policy_of_ones_own_learner_is_evaluated_when_it_is_named(
+def test_a_policy_of_a_users_learner_is_evaluated_if_the_learner_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
-    """The policy's file alone does not import the user's module."""
+    """The user's module is imported only if it is named."""
     (tmp_path / "own_a2c.py").write_text(OWN)
     monkeypatch.delitem(sys.modules, "own_a2c", raising=False)
     monkeypatch.chdir(tmp_path)
@@ -207,7 +207,7 @@ def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_policy_is_trained_in_drawn_bodies(policy: Path) -> None:
-    """The card names the bodies, and belongs to a policy of limbs."""
+    """The card names the bodies, and describes a limb policy."""
     card = load_policy(policy).card
     assert card.env.kwargs == {"bodies": {"split": "train", "count": 3, "seed": 0}}
     assert card.learner == "limbs"
@@ -215,7 +215,7 @@ def test_a_policy_is_trained_in_drawn_bodies(policy: Path) -> None:
 
 @pytest.mark.slow
 def test_a_policy_is_trained_on_a_gpu(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """In many bodies `rsl-ppo` has the network of limbs; the policy acts in a body it never had."""
+    """In many bodies, `rsl-ppo` trains a limb policy, which also acts in other bodies."""
     out = tmp_path / "ants.safetensors"
     of_two = ["train", "Ant", "--bodies", "2", "--learner", "rsl-ppo", "--steps", "48"]
     main([*of_two, "--out", str(out), "--set", *_TINY, 'device="cpu"'])
@@ -227,7 +227,7 @@ def test_a_policy_is_trained_on_a_gpu(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_a_policy_is_evaluated_in_any_body(policy: Path, cli: Cli) -> None:
-    """A limb policy runs in its own family's body, or the one that --env names, without a map."""
+    """A limb policy acts without a map in its family's body, or in the body of --env."""
     evaluate = ("policies", "evaluate", policy, "--episodes", "1")
     own, other = cli.output(*evaluate), cli.output(*evaluate, "--env", "ExtendedAnt")
     assert "forward speed" in own
@@ -253,7 +253,7 @@ def test_a_policy_does_not_fit_another_family(command: str, policy: Path, cli: C
 
 
 def test_other_policies_are_exported_for_their_own_body(tmp_path: Path, cli: Cli) -> None:
-    """A body with a policy that fits only one is refused."""
+    """--body is refused for a policy that fits only one body."""
     export = ("policies", "export", POLICIES["reach"], "--env", "Finger")
     answer = cli.refused(*export, "--out", tmp_path / "finger.onnx")
     assert "Only a limb policy can be exported for another body" in answer

@@ -95,7 +95,7 @@ def complete_suite(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, _Cou
 
 
 def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> None:
-    """A report and a table row for each pair, and a summary sentence."""
+    """The output has a report and a table row for each pair, and a summary sentence."""
     out, _, output = complete_suite
     lines = [line.strip() for line in output.splitlines()]
     header = next(i for i, line in enumerate(lines) if line.startswith("study"))
@@ -114,7 +114,7 @@ def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> 
 def test_a_stopped_suite_resumes_to_the_same_numbers(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After Ctrl-C, the same command runs only what is left."""
+    """After Ctrl-C, the same command executes only the remaining runs."""
     # Reports are slow to draw, and not part of this test.
     monkeypatch.setattr("shapechanger.cli.suite.write_study_report", lambda study, folder: folder)
     whole, all_of_it, _ = complete_suite
@@ -135,7 +135,7 @@ def test_a_stopped_suite_resumes_to_the_same_numbers(
 
 
 class _Failing(_Counting):
-    """Executor of which every study has a run that fails."""
+    """Executor with a failing run in every study."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         """Count the study, and fail."""
@@ -147,7 +147,7 @@ class _Failing(_Counting):
 def test_after_a_failed_run_other_studies_go_on_except_on_a_robot(
     exclusive: bool, studies: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The failed runs are reported at the end; a robot does not move again by itself."""
+    """Failed runs are reported at the end; after a failure, a robot must not move again."""
     plan = suite_command._plan
     monkeypatch.setattr(
         suite_command,
@@ -171,7 +171,7 @@ def test_folders_of_two_machines_are_merged(
     for part, names in parts.items():
         for name in names:
             shutil.copytree(whole / name, tmp_path / part / name)
-    # Results were looked at on the way.
+    # Intermediate results were computed.
     study = tmp_path / "a" / _PAIRS[0] / "study.json"
     study.write_text(json.dumps({**json.loads(study.read_text()), "looks": [4, 2]}))
     # The other machine had been stopped in one of its studies.
@@ -191,7 +191,7 @@ def test_folders_of_two_machines_are_merged(
 def test_conflicting_folders_are_refused(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path
 ) -> None:
-    """Differing results, and the output folder as an input."""
+    """Folders with different results are refused, and so is the output folder as an input."""
     name = _PAIRS[0]
     for part in ("a", "b"):
         shutil.copytree(complete_suite[0] / name, tmp_path / part / name)
@@ -211,7 +211,7 @@ def test_conflicting_folders_are_refused(
 def test_a_suite_can_be_watched(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Complete studies, and running ones with their last evaluation."""
+    """The table has complete studies, and running studies with their last evaluation."""
     shutil.copytree(complete_suite[0], tmp_path / "all")
     at_work = tmp_path / "all" / _PAIRS[0] / "runs" / "fine-tune-1"
     (at_work / "run.json").unlink()

@@ -1,4 +1,4 @@
-"""Suite files: those shipped, and mistakes in others."""
+"""Shipped suite files, and errors for mistakes in suite files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _pairs(name: str) -> list[tuple[str, str, str]]:
     return [(name, str(task.source), str(task.target)) for name, task in tasks]
 
 
-def test_the_shipped_suites_are_those_of_the_docs() -> None:
+def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
     counts = {name: len(_pairs(name)) for name in shipped_suites()}
     assert counts == {
         "ants": 12,
@@ -78,7 +78,7 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
 def test_a_mistake_in_a_file_gives_one_sentence(
     text: str, words: str, tmp_path: Path, cli: Cli
 ) -> None:
-    """With line, alternatives and nearest spelling; nothing is run."""
+    """The sentence has the line, alternatives and the nearest spelling; no study is run."""
     file = tmp_path / "mine.toml"
     file.write_text(text)
     assert words in cli.refused("suite", "run", file, "--out", tmp_path / "out")

@@ -25,7 +25,7 @@ QUICK = ["transfer", "InvertedPendulum", "BigInvertedPendulum", "--quick"]
 
 
 def run(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
-    """Run a command in its own process."""
+    """Run a command in a separate process."""
     return subprocess.run(  # type: ignore[call-overload]
         [*COMMAND, *arguments], capture_output=True, text=True, check=False, **options
     )
@@ -46,7 +46,7 @@ def curves(out: Path) -> dict[str, list[tuple[int, float]]]:
 def quick(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """An uninterrupted quick study: its folder and process."""
+    """Folder and finished process of an uninterrupted quick study."""
     out = tmp_path_factory.mktemp("quick") / "study"
     return out, run(*QUICK, "--out", str(out))
 
@@ -54,7 +54,7 @@ def quick(
 def test_a_study_is_one_command(
     quick: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
-    """A table, study.json, a self-contained report, and one plain line per completed run."""
+    """The command writes study.json and a self-contained report, and a line for each run."""
     out, done = quick
     assert done.returncode == 0, done.stderr
     assert "Jumpstart" in done.stdout
@@ -70,7 +70,7 @@ def test_a_study_is_one_command(
 
 
 def _until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
-    """Wait until something has happened, or the process has ended."""
+    """Wait for a condition, or for the end of the process."""
     end = time.monotonic() + 240.0
     while not condition():
         assert time.monotonic() < end, "waited too long"
@@ -93,7 +93,7 @@ def test_a_killed_study_resumes_to_the_same_numbers(
             start_new_session=True,
         )
         _until((out / "runs" / run_name / "curve.jsonl").exists, process)
-        # Ctrl-C reaches every process of the terminal; a kill only the one.
+        # Ctrl-C reaches every process of the terminal, but a kill reaches only one.
         (os.killpg if how == signal.SIGINT else os.kill)(process.pid, how)
         _, message = process.communicate()
         assert not (out / "study.json").exists()
@@ -139,7 +139,7 @@ def test_a_policy_is_played_in_its_body_and_in_another(
         film.unlink()
 
 
-def test_another_study_or_a_file_in_place_of_the_folder_is_refused(
+def test_another_study_or_a_file_instead_of_the_folder_is_refused(
     quick: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
     done = run(*QUICK, "--seed", "1", "--out", str(quick[0]))
@@ -151,8 +151,8 @@ def test_another_study_or_a_file_in_place_of_the_folder_is_refused(
     assert done.stderr.count("error: Cannot write") == 1
 
 
-def test_a_robot_and_a_task_of_ones_own_are_studied(tmp_path: Path) -> None:
-    """Files and a module of the current folder, in worker processes, in two bodies."""
+def test_a_users_robot_and_task_are_studied(tmp_path: Path) -> None:
+    """Worker processes use files and a module of the current folder, for two bodies."""
     (tmp_path / "dog.xml").write_text(DOG)
     (tmp_path / "tricks.py").write_text(
         "class Rise:\n    def reward(self, robot):\n        return {'height': robot.height}\n"

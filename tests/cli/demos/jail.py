@@ -1,6 +1,6 @@
 """Run commands with little memory, processor time and disk, each in a separate process.
 
-Reads lists of arguments as lines of JSON, and answers each with its exit code and output. The
+It reads lists of arguments as lines of JSON, and prints exit code and output of each command. The
 modules are imported once, before the limits are set.
 """
 

@@ -38,7 +38,7 @@ from tests.demos.exchange.small import drive, keys_folder, tub_folder
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
-    """Two episodes with JPEG frames; in the first, a policy is corrected."""
+    """Two episodes with JPEG frames; in the first one, an expert corrects a policy."""
     for number, steps in enumerate((30, 10)):
         about = header(env="shapechanger/Car-v1", image_size=(40, 30), seed=number)
         with EpisodeWriter.create(tmp_path / "data", about, spare_bytes=0) as writer:
@@ -61,7 +61,7 @@ def episodes(data: Path) -> list[Path]:
 
 
 def test_list(data: Path, demos: Cli) -> None:
-    """Each episode is a line; damaged ones are reported, and the others listed."""
+    """Each episode is a line; a damaged episode is reported after the list."""
     first, second = episodes(data)
     with (second / "steps.jsonl").open("ab") as file:
         file.write(b"torn")
@@ -85,7 +85,7 @@ def test_show_as_text(data: Path, demos: Cli) -> None:
 
 
 def test_show_as_a_page(data: Path, tmp_path: Path, demos: Cli) -> None:
-    """One self-contained file, with drops, marks and a damaged frame, and names escaped."""
+    """The page is self-contained, escapes names, and shows drops, marks and a damaged frame."""
     first, second = episodes(data)
     demos.output("bad", first, "--from", 10, "--to", 19)
     damaged = second / "frames" / "000003.jpg"
@@ -185,7 +185,7 @@ SHORT = ("--minutes", "0.05", "--episode-s", "2", "--options", '{"size": [64, 48
 @pytest.mark.usefixtures("gl")
 @pytest.mark.gl
 def test_an_experts_recording_replays_identically(tmp_path: Path, demos: Cli) -> None:
-    """State and images are equal in every step; each episode has its seed."""
+    """States and images are equal in every step; each episode is replayed with its seed."""
     data = tmp_path / "data"
     printed = demos.output("record", "Car", "--out", data, "--seed", 7, *SHORT)
     assert "wrote 60 steps" in printed
@@ -210,7 +210,7 @@ def test_an_experts_recording_replays_identically(tmp_path: Path, demos: Cli) ->
 
 @pytest.mark.usefixtures("gl")
 @pytest.mark.gl
-def test_a_policy_is_corrected(tmp_path: Path, demos: Cli) -> None:
+def test_an_expert_corrects_a_policy(tmp_path: Path, demos: Cli) -> None:
     """Only the expert's steps are loaded for learning."""
     data = tmp_path / "data"
     policy = ("--driver", str(CLONES["boat"]), "--corrected-by", "expert")
@@ -256,7 +256,7 @@ def test_invalid_arguments_give_one_sentence(
 
 @pytest.mark.usefixtures("gl")
 @pytest.mark.gl
-def test_ctrl_c_leaves_whole_episodes(
+def test_ctrl_c_leaves_complete_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, demos: Cli, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from shapechanger.vehicles.envs.demonstrators import Demonstrator
@@ -286,10 +286,10 @@ def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[s
     )
 
 
-def test_a_partial_import_has_an_exit_code_of_its_own(
+def test_a_partial_import_has_a_separate_exit_code(
     tmp_path: Path, demos: Cli, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """0 for all, 3 for a part, 2 for nothing; findings are on the standard error."""
+    """The exit code is 0 if all is imported, 3 for a part and 2 for nothing."""
     records = [
         {"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 51 * n, "lap": 1}
         for n in range(30)
@@ -333,7 +333,7 @@ def test_export_prints_a_summary_and_how_to_load(
 
 
 def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """How to load a LeRobot dataset is printed, and what takes dropped steps."""
+    """The output explains how to load a LeRobot dataset, and which formats have dropped steps."""
     edit(drive(tmp_path / "data"), Drop(0, 0, "bad"))
     DemosExport(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
     output = capsys.readouterr().out
@@ -347,7 +347,7 @@ def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Settings that train in seconds."""
+    """Change the settings so that training takes seconds."""
     monkeypatch.setattr("shapechanger.demos.cloning.clone.DEMOS", QUICK)
 
 

@@ -1,4 +1,4 @@
-"""`shapechanger demos` given files of an attacker: one sentence, little memory and no other file.
+"""`shapechanger demos` with files of an attacker: each is refused in one sentence.
 
 Each command runs with 384 MiB of memory, ten seconds of processor time and 64 MiB of disk.
 """
@@ -29,7 +29,7 @@ from tests.demos.exchange.small import drive, huge, picture, tub_folder
 pytestmark = [pytest.mark.system, pytest.mark.realtime]
 
 GIB = 1 << 30
-HUGE = 10**400  # More than a float holds.
+HUGE = 10**400  # Larger than any float.
 
 Jail = Callable[..., tuple[int, str]]
 
@@ -56,7 +56,7 @@ def jail() -> Iterator[Jail]:
 
 
 def sparse(path: Path, size: int) -> None:
-    """Make a file that claims `size` bytes and stores none."""
+    """Make a sparse file of `size` bytes, which needs no disk space."""
     path.unlink(missing_ok=True)
     with path.open("wb") as file:
         file.truncate(size)
@@ -75,7 +75,7 @@ def link(path: Path, target: str) -> None:
 
 
 def header_with(**fields: object) -> Callable[[Path], None]:
-    """Return a change of an episode's header."""
+    """Return a function that changes fields of an episode's header."""
 
     def change(episode: Path) -> None:
         path = episode / "episode.json"
@@ -85,7 +85,7 @@ def header_with(**fields: object) -> Callable[[Path], None]:
 
 
 def steps_with(**fields: object) -> Callable[[Path], None]:
-    """Return a change of all steps of an episode, with right checksums."""
+    """Return a function that changes all steps of an episode, with valid checksums."""
 
     def change(episode: Path) -> None:
         path = episode / "steps.jsonl"
@@ -98,7 +98,7 @@ def steps_with(**fields: object) -> Callable[[Path], None]:
 
 
 def added(line: dict[str, Any] | bytes) -> Callable[[Path], None]:
-    """Return a change that appends a line to the steps."""
+    """Return a function that appends a line to the steps of an episode."""
 
     def change(episode: Path) -> None:
         with (episode / "steps.jsonl").open("ab") as file:
@@ -108,7 +108,7 @@ def added(line: dict[str, Any] | bytes) -> Callable[[Path], None]:
 
 
 def nested(depth: int = 100_000) -> bytes:
-    """Return a line of deeply nested JSON with a right checksum."""
+    """Return a line of deeply nested JSON with a valid checksum."""
     body = b'{"kind":' + b"[" * depth + b"]" * depth
     return body + b',"crc":"%08x"}\n' % binascii.crc32(body)
 
@@ -117,7 +117,7 @@ LAYOUT = {"features": [{"name": "x", "unit": "1", "shape": [10**6, 10**6]}]}
 
 
 def test_a_picture_of_many_scans_is_refused() -> None:
-    """Each scan takes the time of an image, and a few bytes of header claim thousands."""
+    """Decoding each scan takes as long as an image, and a few bytes can add thousands of scans."""
     jpeg = picture(0)
     start = jpeg.index(b"\xff\xda")
     with pytest.raises(DemosError, match="more than 64 scans"):
@@ -125,7 +125,7 @@ def test_a_picture_of_many_scans_is_refused() -> None:
 
 
 def refuse(answer: tuple[int, str]) -> str:
-    """Return the sentence with which a command refused."""
+    """Check that a command has refused its input, and return its error."""
     code, text = answer
     assert code == 2, text
     assert text.startswith("error: ")
@@ -135,7 +135,7 @@ def refuse(answer: tuple[int, str]) -> str:
 
 
 def framed(jpeg: bytes) -> Callable[[Path], None]:
-    """Return a change of all images of an episode, with the right size and checksum."""
+    """Return a function that replaces all images of an episode, with valid size and checksum."""
 
     def change(episode: Path) -> None:
         (episode / "frames/000000.jpg").write_bytes(jpeg)
@@ -145,7 +145,7 @@ def framed(jpeg: bytes) -> Callable[[Path], None]:
 
 
 Spoilt = dict[str, tuple[Callable[[Path], object], str]]
-"""Changes of a recording, and words of the refusal, keyed by name."""
+"""Changes of a recording, and a part of the expected error, keyed by name."""
 
 EPISODES: Spoilt = {
     name: (spoil, "")
@@ -178,8 +178,8 @@ PICTURES: Spoilt = {
 
 
 @pytest.mark.parametrize("command", ["list", "merge", "import", "export", "train", "repair"])
-def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path, jail: Jail, command: str) -> None:
-    """An archive is not unpacked, and a pickle, an HDF5 file or a pipe not opened."""
+def test_a_file_instead_of_a_folder_is_refused(tmp_path: Path, jail: Jail, command: str) -> None:
+    """An archive is not unpacked; a pickle, an HDF5 file or a pipe is not opened."""
     options = {
         "merge": ("--out", tmp_path / "out"),
         "import": ("--out", tmp_path / "out"),
@@ -197,8 +197,8 @@ def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path, jail: Jail, comm
 
 
 @pytest.mark.parametrize("target", ["/etc/passwd", "/etc", ".."])
-def test_merge_copies_nothing_that_a_link_leads_to(tmp_path: Path, jail: Jail, target: str) -> None:
-    """A merged recording that is given back would otherwise contain the reader's files."""
+def test_merge_does_not_follow_links(tmp_path: Path, jail: Jail, target: str) -> None:
+    """Otherwise the merged recording could contain private files of the user who merges it."""
     link(drive(tmp_path / "data") / "frames/extra", target)
     text = refuse(jail("merge", tmp_path / "data", "--out", tmp_path / "out"))
     assert "is a link" in text
@@ -206,7 +206,7 @@ def test_merge_copies_nothing_that_a_link_leads_to(tmp_path: Path, jail: Jail, t
 
 
 def edit(path: Path, old: str, new: str) -> None:
-    """Replace a text of a file, which must be there."""
+    """Replace a text that a file must contain."""
     text = path.read_text()
     assert old in text, text
     path.write_text(text.replace(old, new))
@@ -236,7 +236,7 @@ CAMERA = "observation.images.camera"
 
 
 def column(name: str, key: str, values: Callable[[int], object]) -> Callable[[Path], None]:
-    """Return a change of a column of a Parquet file, which is then packed as far as possible."""
+    """Return a function that changes a column of a Parquet file, and compresses the file."""
 
     def change(folder: Path) -> None:
         table = pq.read_table(folder / name)
@@ -257,7 +257,7 @@ def many_rows(folder: Path) -> None:
 
 
 def two_pictures(count: int) -> list[dict[str, object]]:
-    """Return two large images that alternate, so that each row is a new one."""
+    """Return `count` rows with two large images in turn, so that consecutive rows differ."""
     jpegs = [picture(n, 40, 32) + bytes(15 << 20) for n in (0, 1)]
     return [{"bytes": jpegs[n % 2], "path": ""} for n in range(count)]
 
@@ -302,7 +302,7 @@ ACTIONS = "episode_0/actions"
 
 
 def endless(file: h5py.File, place: str) -> None:
-    """Claim 10^12 steps in all columns."""
+    """Give all columns a declared length of 10^12 steps."""
     file.create_dataset(place, (1 << 40,), "f8", chunks=(1 << 10,))
     group = file["episode_0"]
     group.attrs["total_steps"] = 1 << 40
@@ -312,7 +312,7 @@ def endless(file: h5py.File, place: str) -> None:
 
 
 def stored(place: str, spoil: Callable[[h5py.File, str], object]) -> Callable[[Path], None]:
-    """Return a change of an array of a Minari dataset."""
+    """Return a function that changes an array of a Minari dataset."""
 
     def change(folder: Path) -> None:
         with h5py.File(folder / "data/main_data.hdf5", "a") as file:
@@ -323,7 +323,7 @@ def stored(place: str, spoil: Callable[[h5py.File, str], object]) -> Callable[[P
 
 
 def space_of_others(folder: Path) -> None:
-    """Claim a space of 10^9 numbers in a dataset that is not ours, which Minari would fill."""
+    """Declare a space of 10^9 numbers, for which Minari would allocate memory."""
     path = folder / "data/metadata.json"
     known = {"total_episodes", "data_format", "dataset_id"}
     fields = {key: value for key, value in json.loads(path.read_text()).items() if key in known}
@@ -368,7 +368,7 @@ def a_tub(folder: Path) -> Path:
 
 
 def a_lerobot_dataset(folder: Path) -> Path:
-    """Export two episodes as a dataset that is not known to be ours."""
+    """Export two episodes, without the mark that Shapechanger has written them."""
     for count in (30, 2):
         drive(folder.with_name("drives"), count)
     export_recording(folder.with_name("drives"), folder, "lerobot", images=True)
@@ -390,7 +390,7 @@ HOSTILE = (
     (a_lerobot_dataset, LEROBOTS, ("import", "--out", "out")),
     (a_minari_dataset, DATASETS, ("import", "--out", "out")),
 )
-"""Recordings, how they are spoilt, and the command that reads them."""
+"""Recordings, changes that damage them, and the command that reads them."""
 
 
 @pytest.mark.parametrize(
@@ -409,7 +409,7 @@ def test_a_hostile_recording_is_refused(
     words: str,
     command: tuple[str, ...],
 ) -> None:
-    """In one sentence, and nothing is written; `list` has no traceback."""
+    """The error is one sentence, and no file is written; `list` prints no traceback."""
     (tmp_path / "secret.jpg").write_text("secret")
     folder = tmp_path / "data-v0"
     spoil(make(folder))

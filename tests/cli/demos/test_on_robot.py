@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 @pytest.fixture
 def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningRobot]:
-    """A car in a room, remembered as `car`."""
+    """A car in a room, which is a known robot called `car`."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot:
         known = robot.known
@@ -54,7 +54,7 @@ def person(episode: Path, folder: Path) -> Person:
 
 
 def test_a_policy_plays_after_arming(robot: RunningRobot, tmp_path: Path) -> None:
-    """Nothing moves before E; at the end the robot stands still and is disarmed."""
+    """The robot does not move before E; at the end it is at rest and disarmed."""
     episode = forward(tmp_path, robot, 0.6)
     with robot.operator() as operator, person(episode, tmp_path) as terminal:
         operator.place(0)
@@ -70,7 +70,7 @@ def test_a_policy_plays_after_arming(robot: RunningRobot, tmp_path: Path) -> Non
             assert not client.ask().message.armed
 
 
-def test_any_key_stops_it(robot: RunningRobot, tmp_path: Path) -> None:
+def test_any_key_stops_the_robot(robot: RunningRobot, tmp_path: Path) -> None:
     """A key sends an emergency stop, which only a person can clear."""
     episode = forward(tmp_path, robot, 60.0)
     with robot.operator() as operator, person(episode, tmp_path) as terminal:
@@ -87,8 +87,8 @@ def test_any_key_stops_it(robot: RunningRobot, tmp_path: Path) -> None:
             assert client.ask().message.emergency
 
 
-def test_any_key_but_e_leaves(robot: RunningRobot, tmp_path: Path) -> None:
-    """E after another key does not arm, so that resting a hand on the keys is safe."""
+def test_any_key_except_e_ends_the_replay(robot: RunningRobot, tmp_path: Path) -> None:
+    """E after another key does not arm, so that a hand resting on the keys is safe."""
     episode = forward(tmp_path, robot, 0.2)
     with robot.operator() as operator, person(episode, tmp_path) as terminal:
         operator.place(0)

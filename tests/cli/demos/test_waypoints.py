@@ -39,7 +39,7 @@ _PER_METRE = 1.9
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Settings that train in seconds."""
+    """Change the settings so that training takes seconds."""
     settings = LEARNERS["waypoint"]
     assert isinstance(settings, CloningSettings)
     few = {"fewest_steps": 10, "most_steps": 10, "warm_up": 1, "checks": 1, "batch": 16}
@@ -49,7 +49,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _record(folder: Path, n: int = 60, *, state: Layout | None = _STATE, **changes: Any) -> Path:
-    """Record a car as a person would drive it; it stands for the first ten steps."""
+    """Record a car that stands for ten steps and then drives as a person would drive it."""
     fields: dict[str, Any] = {
         "action_layout": _ACTIONS,
         "state_layout": state or Layout(()),
@@ -90,9 +90,9 @@ def _loaded(data: Path, view: CanonicalView | None = None) -> Dataset:
 def test_a_drive_becomes_a_policy_of_waypoints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The command reports its result, and the policy's card the meaning of its actions.
+    """The command reports its result, and the policy's card describes its actions.
 
-    A recording is labelled in an evaluation as in training, so its own one is recognised.
+    An evaluation converts the recording as training does, so it recognises the policy's recording.
     """
     data, out = _record(tmp_path / "drive"), tmp_path / "policy.safetensors"
     DemosTrain(data, out, waypoints=True, ppo=tmp_path / "ppo.zip").run()
@@ -118,8 +118,8 @@ def test_a_drive_becomes_a_policy_of_waypoints(
     assert "as given" in " ".join(capsys.readouterr().out.split())
 
 
-def test_waypoints_are_those_of_the_circle_that_was_driven(tmp_path: Path) -> None:
-    """Pictures are warped, standing steps are left out, and the rest is consistent."""
+def test_waypoints_are_on_the_circle_that_was_driven(tmp_path: Path) -> None:
+    """Images are warped, and steps at rest are left out of all arrays."""
     _record(tmp_path)
     shown = as_waypoints(_loaded(_record(tmp_path, 20)))
     data = shown.data
@@ -133,14 +133,14 @@ def test_waypoints_are_those_of_the_circle_that_was_driven(tmp_path: Path) -> No
     np.testing.assert_allclose(data.actions[49], [math.asin(0.4 * 1.9 * -0.4), 0.2], atol=1e-3)
 
 
-def test_cameras_that_differ_are_warped_each_by_its_own_geometry(tmp_path: Path) -> None:
-    """The note names all of them; a given camera replaces the recording's."""
+def test_images_of_each_camera_are_warped_by_its_geometry(tmp_path: Path) -> None:
+    """The note names all cameras; a given camera replaces the cameras of the recording."""
     _record(tmp_path)
     _record(tmp_path, camera_pitch_deg=8.0, camera_fovy_deg=60.0)
     view = CanonicalView()
     data = _loaded(tmp_path, view)
     assert data.pictures is not None
-    # Both episodes have equal images in their cameras.
+    # The original images of both episodes are equal.
     assert (data.pictures[0] != data.pictures[60]).any()
     assert "looks 0 degrees down" in view.note()
     assert "and looks 8 degrees down with a vertical field of view of 60" in view.note()
@@ -177,7 +177,7 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
 def test_unsuitable_recordings_are_refused(
     tmp_path: Path, changes: dict[str, Any], why: str
 ) -> None:
-    """One sentence names everything missing, and nothing is written."""
+    """One sentence names all missing data, and no file is written."""
     data, out = _record(tmp_path / "drive", **changes), tmp_path / "policy.safetensors"
     with pytest.raises((DemosError, WorldError), match=why):
         DemosTrain(data, out, waypoints=True).run()
@@ -198,7 +198,7 @@ def test_several_bodies_and_no_pictures_are_refused(tmp_path: Path) -> None:
 
 
 def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
-    """Options of waypoints need `--waypoints`, and their kind of policy is given."""
+    """--camera and --response need --waypoints, which excludes --head and --inputs."""
     data, out = tmp_path / "drive", tmp_path / "policy.safetensors"
     with pytest.raises(DemosError, match="need --waypoints"):
         DemosTrain(data, out, camera=(0.0, 48.8)).run()
@@ -213,7 +213,7 @@ def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
 def test_a_recorded_car_teaches_a_policy_for_a_tank(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Two commands, from plain steering to waypoints in another body."""
+    """A policy learned from a car's steering plays in a tank."""
     data, out = tmp_path / "drive", tmp_path / "policy.safetensors"
     main(["demos", "record", "Car", "--out", str(data), "--minutes", "0.1"])
     main(["demos", "train", str(data), "--out", str(out), "--waypoints"])

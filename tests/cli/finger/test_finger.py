@@ -56,7 +56,7 @@ def test_invalid_logs_are_refused(tmp_path: Path, finger: Cli) -> None:
 def test_geared_motors_can_be_assumed_if_the_log_does_not_describe_them(
     tmp_path: Path, finger: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`--geared` gives a log the shipped rig's motors, unless the log describes its motors."""
+    """`--geared` assumes the shipped rig's motors unless the log describes its motors."""
     log, _ = recorded(2.4)
     own = NOMINAL.replace(motor_kg=0.5)
     save_log(dataclasses.replace(log, motors=None), tmp_path / "log.npz")
@@ -75,7 +75,7 @@ def test_geared_motors_can_be_assumed_if_the_log_does_not_describe_them(
 
 @pytest.mark.slow
 def test_a_finger_is_identified(tmp_path: Path, finger: Cli) -> None:
-    """The output has a row per tendon and joint, the undetermined parameters, and a summary."""
+    """The output has all moment arms, the undetermined parameters, and a summary."""
     log, out = tmp_path / "log.npz", tmp_path / "finger.json"
     gap = ("--gap", "real-like", "--finger-seed", 3)
     finger.output("record", "Finger", "--out", log, "--seconds", 6, *gap)
@@ -91,7 +91,7 @@ def test_a_finger_is_identified(tmp_path: Path, finger: Cli) -> None:
 
 
 def test_a_finger_is_exported(tmp_path: Path, finger: Cli) -> None:
-    """A finger of a gap, a file or a set of parameters, and the nominal one; others are refused."""
+    """The finger may be from a gap, a file or a named set of parameters, or nominal."""
     out, file = tmp_path / "finger.xml", tmp_path / "finger.json"
     drawn = GAPS["real-like"].draw(np.random.default_rng(3))
     file.write_text(drawn.to_json())
@@ -113,7 +113,7 @@ def test_a_finger_is_exported(tmp_path: Path, finger: Cli) -> None:
     assert "not both" in finger.refused("export", *to, *both)
     assert "real-like" in finger.refused("export", *to, "--gap", "real-lik")
     assert "cannot be read" in finger.refused("export", *to, "--parameters", tmp_path / "no.json")
-    os.mkfifo(pipe := tmp_path / "pipe.json")  # Without a writer, which would be waited for.
+    os.mkfifo(pipe := tmp_path / "pipe.json")  # Opening a pipe without a writer would block.
     assert "not a regular file" in finger.refused("export", *to, "--parameters", pipe)
     file.write_text("{}]")
     assert "Invalid finger parameters" in finger.refused("export", *to, "--parameters", file)

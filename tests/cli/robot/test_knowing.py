@@ -1,4 +1,4 @@
-"""Served twins become known robots, without replacing others."""
+"""Served twins become known robots, but do not replace other known robots."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_new_robot_is_remembered() -> None:
-    """The message gives the command to drive it; repeating changes nothing."""
+    """The message names the command to drive the robot; a repeat has no effect."""
     message = store(_MINE)
     assert recall("rover") == _MINE
     assert message == "Known here as rover: `shapechanger robot drive rover` drives it from here."
@@ -60,7 +60,7 @@ def test_a_file_that_cannot_be_read_is_left_alone() -> None:
     assert path.read_text() == "key = "
 
 
-# The upper and the lower half of a character, light for ink.
+# Upper and lower half of a character: 0 for a light module of the code, 1 for a dark one.
 _HALVES = {"█": (0, 0), "▀": (0, 1), "▄": (1, 0), " ": (1, 1)}
 
 

@@ -1,4 +1,4 @@
-"""`shapechanger robot drive` opens the console in a browser and passes the key to it alone."""
+"""`shapechanger robot drive` opens the console in a browser, which alone gets the key."""
 
 import sys
 import webbrowser
@@ -16,7 +16,7 @@ from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 
 pytestmark = pytest.mark.realtime
 
-# Fake browser: stores the page that it was given, and the page's file mode.
+# Fake browser: stores the given page, its path and its file mode.
 _BROWSER = """\
 import os, pathlib, sys, urllib.parse
 page = pathlib.Path(urllib.parse.urlparse(sys.argv[2]).path)
@@ -32,7 +32,7 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     script.write_text(_BROWSER)
     monkeypatch.setenv("BROWSER", f"{sys.executable} {script} {out} %s")
     monkeypatch.setenv("DISPLAY", ":99")
-    # The fake browser has read the page when it exits; not every file system reports the access.
+    # The page is read when the fake browser exits; not every file system reports the access.
     monkeypatch.setattr(opening, "_OPENED_WITHIN_S", 0.1)
     return out
 
@@ -59,7 +59,7 @@ def test_drive_opens_the_console_with_its_key(
 
 
 def test_without_a_display_nothing_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The terminal is used instead."""
+    """Without a display, the terminal is used."""
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     assert can_open() == (sys.platform == "darwin")

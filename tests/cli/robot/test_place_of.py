@@ -36,12 +36,12 @@ def _shipped(name: str) -> Profile:
     ],
 )
 def test_the_default_place(name: str, place: Place) -> None:
-    """Vehicles get their own world, fingers a rig, and others the room."""
+    """Vehicles get the world of their kind, fingers a rig, and other robots the room."""
     assert place_of(_shipped(name), "", ()) == place
 
 
-def test_a_finger_of_a_gap() -> None:
-    """The finger is the one that `Finger-v1` draws for the seed."""
+def test_the_finger_of_a_gap_is_the_finger_of_the_env() -> None:
+    """`Finger-v1` draws the same finger for the seed."""
     drawn = place_of(_shipped("finger"), "", (), "real-like", 3)
     assert drawn == finger_place(GAPS["real-like"].draw(np.random.default_rng(3)))
     with pytest.raises(RobotError, match="lab-car has no servos for the tendons FDP"):

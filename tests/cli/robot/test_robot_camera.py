@@ -28,7 +28,7 @@ def _jpeg(path: Path, picture: NDArray[np.uint8]) -> str:
 
 
 def test_a_board_is_measured_written_and_drawn(profile: Path, tmp_path: Path, cli: Cli) -> None:
-    """Without a board, the drawing uses the profile."""
+    """Without a board, the values of the profile are drawn."""
     picture = _jpeg(tmp_path / "board.jpg", board_picture(4.0, 48.8, 35.0))
     said = cli.output("robot", "camera", profile, "--picture", picture, "--board", "7x5")
     camera = load_profile(profile).camera
@@ -42,10 +42,8 @@ def test_a_board_is_measured_written_and_drawn(profile: Path, tmp_path: Path, cl
     assert Path("again.jpg").read_bytes() == first
 
 
-def test_a_mark_at_the_height_of_the_lens_is_enough(
-    profile: Path, tmp_path: Path, cli: Cli
-) -> None:
-    """--horizon and --fovy replace the board."""
+def test_the_pitch_is_measured_from_a_horizon(profile: Path, tmp_path: Path, cli: Cli) -> None:
+    """No board is needed with --horizon and --fovy."""
     picture = _jpeg(tmp_path / "wall.jpg", np.full((120, 160, 3), 90, np.uint8))
     options = ("--picture", picture, "--horizon", "50", "--fovy", "48.8")
     cli.output("robot", "camera", profile, *options)

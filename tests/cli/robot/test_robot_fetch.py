@@ -62,10 +62,10 @@ def record(folder: Path, count: int = 40) -> Path:
     return writer.path
 
 
-def test_fetching_copies_exactly_and_then_only_what_is_new(
+def test_fetching_copies_exactly_and_later_only_new_data(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Judgements made since on the robot are fetched too."""
+    """Later edits on the robot are fetched too."""
     first, data = record(there), tmp_path / "here"
     fetch = ["robot", "fetch", "car", "--out", str(data)]
     main(fetch)
@@ -86,7 +86,7 @@ def test_fetching_copies_exactly_and_then_only_what_is_new(
 
 
 def test_an_interrupted_fetch_resumes(there: Path, robot: RobotClient, tmp_path: Path) -> None:
-    """Cut at any byte of lines or frames; partial episodes are invisible to readers."""
+    """The transfer may end at any byte of lines or frames; incomplete episodes are not listed."""
     rng = random.Random(3)
     episode = record(there)
     lines = (episode / "steps.jsonl").read_bytes()
@@ -97,7 +97,7 @@ def test_an_interrupted_fetch_resumes(there: Path, robot: RobotClient, tmp_path:
         part = data / f".{episode.name}.fetching"
         (part / "frames").mkdir(parents=True)
         (part / "steps.jsonl").write_bytes(lines[:cut])
-        # Frames are written before their line, and the last one may be incomplete.
+        # Frames are written before their line, and the last frame may be incomplete.
         whole = lines[:cut].count(b"\n")
         for frame in sorted((episode / "frames").iterdir()):
             if int(frame.stem) < whole:
@@ -115,10 +115,10 @@ def test_an_interrupted_fetch_resumes(there: Path, robot: RobotClient, tmp_path:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_edits_of_both_sides_survive(
+def test_edits_on_robot_and_workstation_are_kept(
     there: Path, robot: RobotClient, tmp_path: Path, seed: int
 ) -> None:
-    """Whatever is edited where and when, no edit is lost, and the ones made here count last."""
+    """No edit of either side is lost; edits on the workstation take precedence."""
     rng = random.Random(seed)
     episode, data = record(there, 12), tmp_path / "here"
     local = data / episode.name
@@ -143,8 +143,8 @@ def test_edits_of_both_sides_survive(
     assert snapshot(local) == before
 
 
-def test_a_repair_here_stays(there: Path, robot: RobotClient, tmp_path: Path) -> None:
-    """The robot's episode was cut off, and that here is closed already."""
+def test_a_repaired_copy_is_kept(there: Path, robot: RobotClient, tmp_path: Path) -> None:
+    """The robot's episode is incomplete, and the copy on the workstation was closed by a repair."""
     header = json.loads((path := record(there, 6) / "episode.json").read_text())
     path.write_text(json.dumps(header | {"closed": None}))
     episode, data = path.parent, tmp_path / "here"
@@ -155,7 +155,7 @@ def test_a_repair_here_stays(there: Path, robot: RobotClient, tmp_path: Path) ->
     assert snapshot(data) == before
 
 
-def test_other_steps_are_not_overwritten(
+def test_an_episode_with_other_steps_is_not_overwritten(
     there: Path, robot: RobotClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The conflict is reported, other episodes are fetched, and the exit code is 1."""
@@ -180,7 +180,7 @@ def test_other_steps_are_not_overwritten(
 def test_damaged_episodes_are_not_fetched(
     there: Path, robot: RobotClient, tmp_path: Path, damage: str
 ) -> None:
-    """Partial data are kept until the episode is repaired."""
+    """Data fetched so far are kept until the episode is repaired."""
     episode = record(there, 9)
     frame = episode / "frames" / "000003.jpg"
     if damage == "line":

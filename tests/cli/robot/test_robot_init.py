@@ -1,4 +1,4 @@
-"""`shapechanger robot init`: its questions."""
+"""`shapechanger robot init` with its questions, and `shapechanger robot install`."""
 
 import io
 import shutil
@@ -23,7 +23,7 @@ class _Terminal(io.StringIO):
 
 @pytest.fixture
 def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[str], list[str]]:
-    """Questions so far, and the answers to come; Ctrl-D follows them."""
+    """Two lists: the questions so far, and the answers to give; after them Ctrl-D is pressed."""
     questions: list[str] = []
     answers: list[str] = []
 
@@ -41,8 +41,8 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[str], l
     return questions, answers
 
 
-def test_enter_takes_the_defaults(asked: tuple[list[str], list[str]]) -> None:
-    """The profile is then the shipped one."""
+def test_enter_selects_the_defaults(asked: tuple[list[str], list[str]]) -> None:
+    """The profile is then the same as the shipped profile."""
     questions, answers = asked
     answers += [""] * 4
     RobotInit().run()
@@ -53,7 +53,7 @@ def test_enter_takes_the_defaults(asked: tuple[list[str], list[str]]) -> None:
 def test_answers_are_checked(
     asked: tuple[list[str], list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A wrong choice is asked for again, and a profile that exists is refused at the end."""
+    """An invalid choice is asked for again; an existing profile is refused at the end."""
     _, answers = asked
     answers += ["kar", "tank", "rover", "noen", "none", "anyone"]
     RobotInit().run()
@@ -76,7 +76,7 @@ def test_answers_are_checked(
 def test_the_end_of_the_answers_writes_nothing(
     asked: tuple[list[str], list[str]], tmp_path: Path
 ) -> None:
-    """Ctrl-D ends it with one sentence."""
+    """Ctrl-D ends the command with one sentence."""
     _, answers = asked
     answers += ["car", "rover"]
     with pytest.raises(RobotError, match="nothing was written"):
@@ -84,10 +84,10 @@ def test_the_end_of_the_answers_writes_nothing(
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_arguments_ask_nothing(
+def test_with_arguments_no_question_is_asked(
     asked: tuple[list[str], list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A script can choose the same; it needs the kind, as a command without a terminal does."""
+    """Arguments can set all answers. Without a terminal, the kind must be given."""
     with pytest.raises(RobotError, match=r"`shapechanger robot init car`. There are: .*boat"):
         RobotInit(name="rover").run()
     RobotInit("car", "bench", camera="none").run()
@@ -106,7 +106,7 @@ def pi(tmp_path: Path) -> FakePi:
 
 @pytest.fixture
 def car(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Profile:
-    """A car that `init` made, in a folder with a blank."""
+    """A car that `init` has made, in a folder whose name has a blank."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     make_credentials(tmp_path / "config/shapechanger/robots/rover", "rover")
     return load_profile(write_profile("car", tmp_path / "my home/rover.toml", "rover"))
@@ -141,7 +141,7 @@ def test_install_reports_each_change(pi: FakePi, car: Profile, said: Said) -> No
 
 
 def test_a_dry_run_needs_the_unit_only(pi: FakePi, said: Said) -> None:
-    """A dry run writes nothing, so the unit of `init` has to be there."""
+    """A dry run writes no file, so the unit must have been written by `init`."""
     with pytest.raises(RobotError, match="without --dry-run, this command writes it"):
         said(dry_run=True)
     said()
@@ -152,8 +152,10 @@ def test_a_dry_run_needs_the_unit_only(pi: FakePi, said: Said) -> None:
     assert pi.ran == []
 
 
-def test_who_is_refused(pi: FakePi, car: Profile, said: Said, tmp_path: Path) -> None:
-    """Root, a unit of another profile or user, a robot without its key, and another computer."""
+def test_an_unsuitable_user_unit_key_or_computer_is_refused(
+    pi: FakePi, car: Profile, said: Said, tmp_path: Path
+) -> None:
+    """Root, units of another profile or user, robots without a key and other computers fail."""
     with pytest.raises(RobotError, match="without sudo"):
         RobotInstall("rover.toml").install(car, replace(pi.machine, user="root"))
     unit = car.path.with_name("shapechanger-rover.service")

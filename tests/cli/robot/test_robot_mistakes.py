@@ -39,7 +39,7 @@ def robot(capsys: pytest.CaptureFixture[str]) -> Cli:
 def home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A working folder with empty configuration and temporary folders.
 
-    Its path is short, as sockets require.
+    The path of the folder is short, because paths of sockets must be short.
     """
     tmp_path = Path(tempfile.mkdtemp())
     for name, variable in (("config", "XDG_CONFIG_HOME"), ("tmp", "TMPDIR")):
@@ -58,7 +58,7 @@ def files(folder: Path) -> set[str]:
 
 
 def write_ready_profile(home: Path, text: str = CAR) -> str:
-    """Write a profile whose robot has its key and certificate."""
+    """Write the profile, key and certificate of a robot, and return the profile's name."""
     profile = write_profile(home / "work", text)
     make_credentials(home / "config" / "shapechanger" / "robots" / profile.name, profile.name)
     return str(profile.path)
@@ -133,7 +133,7 @@ MISTAKES = (
 def test_one_sentence(
     robot: Cli, home: Path, monkeypatch: pytest.MonkeyPatch, command: str, text: str
 ) -> None:
-    """Exit code 2, and no new file or process."""
+    """The exit code is 2, and no file or process is left."""
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
     write_ready_profile(home)
     (home / "work" / "twice.toml").write_text(changed("pins = [13, 12]", "pins = [22, 12]"))
@@ -144,7 +144,7 @@ def test_one_sentence(
     assert files(home) == before
 
 
-def test_the_key_is_asked_for(robot: Cli) -> None:
+def test_remember_requires_the_key(robot: Cli) -> None:
     """The key must not be given on the command line."""
     command = ("remember", "one", "127.0.0.1", "--fingerprint", "insecure")
     assert "SHAPECHANGER_KEY" in robot.refused(*command)
@@ -169,7 +169,7 @@ def test_a_twin_on_another_clock(robot: Cli, home: Path) -> None:
 
 
 def test_init_never_overwrites(robot: Cli, home: Path) -> None:
-    """Profile and key are kept; another profile of the same robot's name has the same key."""
+    """Profile and key are kept; another profile with the same robot's name has the same key."""
     output = robot.output("init", "car", "--name", "rover")
     key = next(line.split()[1] for line in output.splitlines() if line.startswith("key  "))
     profile = home / "work" / "rover.toml"
@@ -183,7 +183,7 @@ def test_init_never_overwrites(robot: Cli, home: Path) -> None:
 
 
 def test_the_key_can_be_shown_again(robot: Cli, home: Path) -> None:
-    """The output matches `init`'s, with the full fingerprint."""
+    """The output has the key and fingerprint that `init` has printed."""
     made = robot.output("init", "car", "--name", "rover")
     output = robot.output("key", "rover")
     assert all(part in made for part in output.strip().split("\n\n"))
@@ -194,8 +194,8 @@ def test_the_key_can_be_shown_again(robot: Cli, home: Path) -> None:
 
 
 @WITHOUT_PINS
-def test_a_profile_in_this_folder_is_found_by_its_name(robot: Cli, home: Path) -> None:
-    """A shipped profile of that name takes precedence."""
+def test_a_profile_in_the_current_folder_is_found_by_its_name(robot: Cli, home: Path) -> None:
+    """A shipped profile of the same name takes precedence."""
     write_ready_profile(home)
     wiring = ("--wiring", "--port", "0")
     output = robot.ended(1, "check", "test-car", *wiring).out
@@ -205,7 +205,7 @@ def test_a_profile_in_this_folder_is_found_by_its_name(robot: Cli, home: Path) -
 
 
 def test_stopping_a_robot_that_is_off(robot: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Exit code 1, and an error that the stop was not confirmed."""
+    """The exit code is 1, and the error says that the stop was not confirmed."""
     with socket.create_server(("127.0.0.1", 0)) as unused:
         address = f"127.0.0.1:{unused.getsockname()[1]}"
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
@@ -225,7 +225,7 @@ def test_a_machine_without_pins(robot: Cli, home: Path, command: str) -> None:
 def test_a_full_disk_leaves_no_partial_robot(
     robot: Cli, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No file is empty, and `init` can be run again."""
+    """No partial file is left, and `init` can be run again."""
     real, left = os.fsync, 0
 
     def fsync(fd: int) -> None:
@@ -236,7 +236,7 @@ def test_a_full_disk_leaves_no_partial_robot(
         real(fd)
 
     monkeypatch.setattr("os.fsync", fsync)
-    for first in (0, 1, 2, 3, 1):  # Complete files are kept.
+    for first in (0, 1, 2, 3, 1):  # Complete files of earlier attempts are kept.
         left = first
         assert "No space left" in robot.refused("init", "car", "--name", "rover")
         assert not (home / "work" / "rover.toml").exists()
@@ -263,7 +263,7 @@ def test_a_broken_file_of_a_known_robot_is_skipped(
 
 
 def test_questions_are_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only yes, no and the end of the input are answers."""
+    """A question is repeated until the answer is yes or no, or the input ends."""
     answers = iter(["", "maybe", "Y", "n"])
 
     def answer() -> str:

@@ -71,7 +71,7 @@ forward_us = 1900
 mix = { throttle = 1.0 }
 """
 
-# A car whose blade is up at rest, and has no key.
+# A car with a blade, which is up at rest, and which no key moves.
 PLOUGH = changed(
     "[output.drive]",
     """[action.blade]
@@ -93,7 +93,7 @@ mix = { blade = 1.0 }
 def _at_the_terminal(
     folder: Path, cap: str, text: str = PATIENT_CAR
 ) -> Generator[tuple[RunningRobot, Operator, Person]]:
-    """Drive a served car from a terminal, with `folder` as the home; Q ends it."""
+    """Drive a served car from a terminal, with `folder` as the home; Q ends the command."""
     with (
         pytest.MonkeyPatch.context() as patch,
         run_robot(write_profile(folder, text), arguments=IN_A_ROOM) as robot,
@@ -106,7 +106,7 @@ def _at_the_terminal(
             yield robot, operator, person
 
             def leaves() -> bool:
-                person.press("q")  # Just after Escape it belongs to a sequence.
+                person.press("q")  # Directly after Escape, Q would be part of an escape sequence.
                 return person.process.poll() is not None
 
             person.wait_for(leaves)
@@ -114,7 +114,7 @@ def _at_the_terminal(
 
 
 def test_driving(tmp_path: Path) -> None:
-    """E arms, W drives, X disarms, Space and Escape stop, and Q leaves."""
+    """E arms, W drives, X disarms, Space and Escape stop, and Q ends the command."""
     with _at_the_terminal(tmp_path, "1.0") as (_, operator, person):
         start = operator.where().travelled_m
         person.read_until("not armed")
@@ -148,7 +148,7 @@ def test_actions_without_a_key_stay_at_rest(tmp_path: Path) -> None:
 
 
 def test_a_cap_below_a_threshold_is_reported(tmp_path: Path) -> None:
-    """Three-level steering does nothing below its threshold, and the person is told."""
+    """Three-level steering has no effect below its threshold, and a hint is shown."""
     with _at_the_terminal(tmp_path, "0.2") as (_, _, person):
         person.read_until("not armed")
         person.press("e")
@@ -162,7 +162,7 @@ def test_a_cap_below_a_threshold_is_reported(tmp_path: Path) -> None:
 
 
 def test_a_person_lets_a_waiting_program_drive(tmp_path: Path) -> None:
-    """P hands the armed robot to the program, and the person can still stop it."""
+    """P gives the armed robot to the program, and the person can still stop it."""
     with _at_the_terminal(tmp_path, "0.5") as (_, _, person):
         read = person.read_until("not armed")
         person.press("p")
@@ -190,11 +190,11 @@ def test_a_person_lets_a_waiting_program_drive(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Needs the parent-death signal.")
 def test_killing_the_command_ends_its_robot(tmp_path: Path) -> None:
-    """Closing the terminal must not leave an armed robot."""
+    """An armed robot must not keep running after its terminal was closed."""
     profile = write_profile(tmp_path, CAR + MOTOR)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path) as person:
         person.read_until("begins to move")
-        # The supervisor, and below it guard and daemon.
+        # The supervisor, and its child processes guard and daemon.
         person.wait_for(lambda: len(_below(person.process.pid)) >= 3)
         robot = _below(person.process.pid)
         person.process.kill()
@@ -212,7 +212,7 @@ def _below(pid: int) -> list[int]:
 
 
 def _calibrate(folder: Path, text: str, *steps: tuple[str, str], code: int = 0) -> tuple[str, str]:
-    """Press keys after each prompt, and return its output and the profile afterwards."""
+    """Calibrate with keys after each prompt; return the output, and the profile afterwards."""
     profile = write_profile(folder, text)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), folder) as person:
         read = 0
@@ -224,11 +224,11 @@ def _calibrate(folder: Path, text: str, *steps: tuple[str, str], code: int = 0) 
 
 
 def test_calibrating_a_motor_and_a_servo(tmp_path: Path) -> None:
-    """What was found is written, a reversed motor gets a negative mix, and other lines stay."""
+    """Results are written, a reversed motor gets a negative mix, and other lines are kept."""
     steps = (
         ("begins to move", "d" * 4 + "\r"),
         ("Y or N", "n"),
-        ("full left", "a" * 25 + "\r"),  # From 1500 us to the left, 2 % of 900 us each.
+        ("full left", "a" * 25 + "\r"),  # 25 steps from 1500 us to the left, each 2 % of 900 us.
         ("straight", "d\r"),
         ("full right", "d" * 20 + "\r"),
     )
@@ -244,7 +244,7 @@ def test_calibrating_a_motor_and_a_servo(tmp_path: Path) -> None:
         assert kept in text
 
 
-def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
+def test_an_esc_exceeds_the_cap_only_after_a_confirmation(tmp_path: Path) -> None:
     steps = (
         ("fastest backward", "a" * 40),
         ("Go beyond it?", "\r"),
@@ -259,7 +259,7 @@ def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("key", ["q", " ", "\x1b"])
-def test_ending_writes_nothing_and_goes_no_further(tmp_path: Path, key: str) -> None:
+def test_a_key_that_ends_the_calibration_discards_results(tmp_path: Path, key: str) -> None:
     """Q, Space and Escape end the calibration and discard results; N skips one output."""
     both = CAR + SERVO + MOTOR
     steps = (("full left", "n"), ("begins to move", "dddd\r"), ("Y or N", key))
@@ -267,7 +267,7 @@ def test_ending_writes_nothing_and_goes_no_further(tmp_path: Path, key: str) -> 
     assert (text, "nothing was written" in said) == (both, True)
 
 
-def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
+def test_an_error_keeps_earlier_results(tmp_path: Path) -> None:
     """The motor's results are written, and the robot does not count as calibrated."""
     steps = [("begins to move", "dddd"), ("duty 0.16", "\r"), ("Y or N", "y")]
     for place in ("full left", "straight", "full right"):
@@ -284,7 +284,7 @@ def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
 def test_a_second_person_stops_a_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """`robot stop` works while another client drives, and stays in force."""
+    """`robot stop` works while another client drives, and the stop stays in force."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(write_profile(tmp_path, BLIND_CAR), arguments=IN_A_ROOM) as robot:
         remember(replace(robot.known, name="car"))
@@ -300,10 +300,10 @@ def test_a_second_person_stops_a_robot(
             assert seen.action_applied[1] == 0.0
 
 
-def test_a_served_twin_is_known_by_its_name(
+def test_a_served_twin_becomes_a_known_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of any free port, the real one is stored."""
+    """With --port 0, the port that was selected is stored."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     profile = write_profile(tmp_path, BLIND_CAR)
     serve = ("robot", "serve", str(profile.path), "--twin", "--no-announce", "--port", "0")
@@ -321,7 +321,7 @@ def test_a_served_twin_is_known_by_its_name(
 def test_a_person_lets_a_policy_drive_and_corrects_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """P starts the policy, a direction key takes over, and both are recorded."""
+    """P lets the policy drive, a direction key takes control, and both drivers are recorded."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(
         write_profile(tmp_path, PATIENT_CAR), arguments=("--world", "corridor")
@@ -356,7 +356,7 @@ def test_a_person_lets_a_policy_drive_and_corrects_it(
 def test_recordings_are_kept_after_a_failure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The error names the command that downloads it; otherwise it is complete here."""
+    """After an error, the output names the command that downloads the recording."""
     with (
         run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
         robot.client(role="person") as person,

@@ -1,4 +1,4 @@
-"""A terminal session: sends keys and reads the output of a command."""
+"""Terminal sessions of commands, which tests send keys to."""
 
 import os
 import pty
@@ -44,7 +44,7 @@ class Person:
         self._reader.start()
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return the session."""
         return self
 
     def __exit__(self, *_: object) -> None:
