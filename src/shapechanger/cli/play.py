@@ -29,8 +29,7 @@ class Watching:
     """Options of a command that shows episodes."""
 
     out: Path | None = None
-    """A film to write instead of opening a window, such as ant.mp4; by default play.mp4 if there is
-    no screen."""
+    """A film to write instead of a window, such as ant.mp4; play.mp4 if there is no screen."""
     episodes: int = 1
     """Number of episodes."""
     seed: int = 0

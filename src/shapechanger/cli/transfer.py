@@ -62,8 +62,7 @@ class StudyRuns:
     address: str | None = None
     """Address of the Ray cluster: 10.0.0.1:6379 or auto; Ray on this machine if not given."""
     workers: int | None = None
-    """Number of runs at a time; if not given, one for each core, or one if the target is a
-    robot."""
+    """Number of runs at a time; one for each core by default, or one if the target is a robot."""
 
     def made_executor(self) -> Executor:
         """Return the executor of the runs."""

@@ -48,9 +48,7 @@ def test_outputs_set_tensions_that_the_sensors_report(
             reading = sensors.read(operator.advance(0.01), 0.0)
         assert reading.failures == {}
         assert reading.quantities["FDP/tension"] == pytest.approx(8.0, abs=0.1)
-        assert operator.tensions()["FDP"] == pytest.approx(
-            8.0, abs=1.5
-        )  # Tolerance for friction and speed.
+        assert operator.tensions()["FDP"] == pytest.approx(8.0, abs=1.5)  # Friction of gears.
         outputs.release()
         operator.advance(0.3)
         assert operator.tensions()["FDP"] < 1.5

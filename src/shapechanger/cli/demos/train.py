@@ -141,7 +141,7 @@ class DemosTrain(_Waypoints):
         }
         policy = policy.carded(clone=net, command=command_line(), data=origin)
         note = (
-            f"It is evaluated on the last {len(data) - n} of {len(data)} steps, unseen in training."
+            f"It is evaluated on the last {len(data) - n} of {len(data)} steps, which are unseen."
         )
         if not evaluated.any():
             evaluated = learned

@@ -46,16 +46,14 @@ class RobotCamera:
     picture: Path | None = None
     """JPEG file of the whole field of view; if not given, the robot's camera takes an image."""
     board: str = ""
-    """Numbers of inner corners of a checkerboard that stands upright before the robot, such as
-    9x6."""
+    """Inner corners along both sides of an upright checkerboard before the robot, such as 9x6."""
     horizon: float | None = None
     """Row of the horizon in the image, pixels from the top, for example of a distant mark at the
     height of the lens."""
     fovy: float | None = None
     """Vertical field of view, degrees, from the data sheet."""
     out: Path = Path("camera.jpg")
-    """The drawing to write: the image with the horizon and the outline of the virtual camera's
-    view, and next to it that view, which waypoint policies observe."""
+    """The drawing to write: the image with the horizon, and the view of waypoint policies."""
 
     def run(self) -> None:
         import simplejpeg

@@ -134,10 +134,7 @@ _BY_KEYS: Final = frozenset({"steering", "throttle"})
 
 
 class Driving:
-    """Terminal session of a person who drives a robot; P gives control to a waiting program.
-
-    The program is usually `pilot`, the policy of this command.
-    """
+    """Terminal session of a person who drives, and may let `pilot` or a waiting program drive."""
 
     def __init__(
         self, robot: RobotClient, terminal: Terminal, cap: float, pilot: PolicyDriver | None = None

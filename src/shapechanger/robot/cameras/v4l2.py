@@ -88,9 +88,7 @@ class V4l2(Camera):
     ) -> None:
         super().__init__(plan)
         if ctypes.sizeof(ctypes.c_void_p) != 8:
-            raise RobotError(
-                "The v4l2 camera needs a 64-bit system: use the camera `pipe` with ffmpeg."
-            )
+            raise RobotError("The v4l2 camera needs a 64-bit system: use a pipe from ffmpeg.")
         self._ioctl = ioctl
         self._device: str = plan.settings["device"]
         self._buffers: list[mmap.mmap] = []

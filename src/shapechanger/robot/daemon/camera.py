@@ -104,9 +104,7 @@ class FrameReader:
                     good, bad = True, 0
                     self._deliver(frame)
                     if frame.skipped and not self._skips:
-                        self._skips = (
-                            True  # Report once: some streams have bytes between all frames.
-                        )
+                        self._skips = True  # Some streams have bytes between all frames.
                         self._report(
                             f"The camera's stream has bytes between its JPEG frames, "
                             f"{frame.skipped} before this frame: they are skipped."

@@ -171,9 +171,7 @@ class AcceptedSocket:
         if self._protocol.transport is not None:
             self._protocol.transport.abort()
             return
-        with contextlib.suppress(
-            OSError
-        ):  # This ends a handshake, which reads the end of the data.
+        with contextlib.suppress(OSError):  # The end of the data ends a handshake.
             self._socket.shutdown(socket.SHUT_RDWR)
 
     async def _connect(self, tls: ssl.SSLContext | None) -> None:

@@ -145,7 +145,6 @@ class Board:
         raise RobotError("This board runs in real time, which cannot be advanced.")
 
     def _serve(self, timeout_s: float | None) -> None:
-        """Wait for calls and execute them."""
         poll = select.poll()
         for fd in (self._listening.fileno(), self._owner_fd, *self._connections):
             poll.register(fd, select.POLLIN)
@@ -160,7 +159,6 @@ class Board:
             self._connections[connected.fileno()] = BoardConnection(connected)
 
     def _execute_all(self, connection: BoardConnection) -> None:
-        """Execute all calls that have arrived from a client."""
         if connection.executes or connection.closed:
             return
         connection.executes = True
@@ -288,9 +286,7 @@ class TwinTimeBoard(Board):
 if __name__ == "__main__":
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C stops the robot, which the board outlives.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C must stop the robot first.
     given = msgspec.json.decode(sys.argv[2], type=BoardSettings)
     with suppress(_OwnerGone):
         (Board if given.clock == "real" else TwinTimeBoard)(given, int(sys.argv[1])).run()

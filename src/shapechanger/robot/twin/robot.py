@@ -163,8 +163,7 @@ def run_robot(
         twin: Whether to serve it on its twin.
         clock: Clock of a twin: the machine's clock ("real"), or one that only clients advance.
         seed: Seed of a twin's world.
-        folder: Folder for the robot's files; None for a temporary folder. If a twin's board already
-            runs there, it is used.
+        folder: Folder of the robot's files, and of a running twin's board; None for a new one.
         arguments: Further arguments of `shapechanger robot serve`.
 
     Raises:
@@ -190,8 +189,7 @@ def run_robot(
             stderr=log,
             # Ctrl-C must reach only the driving program, which then ends the robot.
             process_group=0,
-            # The robot must end with this process, for example if its terminal is closed. The
-            # setting survives `exec`.
+            # The robot must end with this process. The setting survives `exec`.
             preexec_fn=lambda: ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM),
         )
     return RunningRobot(folder, supervisor, temporary=temporary)
