@@ -128,9 +128,7 @@ def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
         writer.write(jpeg_of(20)[100:])
         assert camera.read().jpeg == jpeg_of(20)
         writer.write(jpeg_of(30))
-    assert camera.read().jpeg == jpeg_of(
-        30
-    )  # The writer has closed the pipe, but this frame is new.
+    assert camera.read().jpeg == jpeg_of(30)  # New, although the writer has closed the pipe.
     with pytest.raises(RobotError, match="has ended"):
         camera.read()
 
