@@ -117,7 +117,7 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
     ("command", "words"),
     [
         ("train Ant --learner ppo-rum", "Did you mean 'ppo-run'?"),
-        ("train Ant --steps 10", "smaller than one evaluation"),
+        ("train Ant --steps 10", "A budget of 10 steps is too small"),
         ("transfer Ant ExtendedAnt --rule foot_1", "NAME=RULE"),
         ("transfer Ant ExtendedAnt --map none.toml", "cannot be read"),
         ("transfer Ant BigAnt --workers 0", "at least one worker"),

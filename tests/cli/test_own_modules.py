@@ -56,7 +56,7 @@ SUITE = "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\
             "my_learner",
             LEARNER,
             ["train", "InvertedPendulum", "--learner", "my_learner:build", "--steps", "10"],
-            "A budget of 10 steps is smaller than one evaluation",
+            "A budget of 10 steps is too small",
         ),
         (
             "my_method",

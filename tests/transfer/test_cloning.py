@@ -254,7 +254,7 @@ def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> 
 def test_a_study_resumes_with_its_planned_clone_only(clone_file: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.safetensors"
     load_policy(clone_file).carded(command="again").save(other)
-    with pytest.raises(StudyError, match="not the one that this study was planned with"):
+    with pytest.raises(StudyError, match="not the policy that the plan names"):
         run_study(_given(clone_file), tmp_path / "study", source_policy=other, executor=Serial())
 
 

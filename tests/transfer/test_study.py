@@ -236,7 +236,7 @@ def test_a_full_disk_loses_nothing(
 
 
 def test_evaluations_are_not_more_frequent_than_updates() -> None:
-    with pytest.raises(StudyError, match="more often than an update"):
+    with pytest.raises(StudyError, match="eval_every must be at least"):
         msgspec.structs.replace(TINY, eval_every=31)
     with pytest.raises(StudyError, match="at least one env"):
         msgspec.structs.replace(TINY, n_envs=0)

@@ -159,7 +159,7 @@ def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
         perform_run(plan, run, "study", None, lambda steps: None)
     assert snapshot(copied / "study") == before
     require_planned(plan, Run("source", 0))  # The source's has not changed.
-    with pytest.raises(ForeignStudy, match="What this study was planned with has changed"):
+    with pytest.raises(ForeignStudy, match="An env or code of this study has changed"):
         study_of(plan, Path("new"))
 
 
@@ -170,7 +170,7 @@ def test_a_run_of_another_version_is_refused(copied: Path) -> None:
     result = msgspec.json.decode(path.read_bytes())
     result["identity"]["target"]["model"] = "0" * 16
     path.write_bytes(msgspec.json.encode(result))
-    with pytest.raises(ForeignStudy, match="result of another version than the one planned"):
+    with pytest.raises(ForeignStudy, match="result of another version than the planned one"):
         load_result(plan, Path("study"), Run("scratch", 0))
 
 

@@ -3,8 +3,8 @@
 A learner explores with the same deviation in every action, so it learns nothing where an actuator
 takes ±200 N·m, and overshoots where one takes ±0.1 rad. Every learner therefore acts from -1 to 1.
 Everything else is in the units of the env: layouts, body maps, `TrainedPolicy.act`, exported
-policies, recordings and evaluations. The border runs between a model of Stable-Baselines3 and all
-that surrounds it: `model.action_space` is the model's side, and the action layout the env's.
+policies, recordings and evaluations. Only a model of Stable-Baselines3 uses the scaled actions:
+`model.action_space` is their range, and the action layout is the range of the env's actions.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class ActionScale(NamedTuple):
         return ((actions - self.middle) / self.half).astype(actions.dtype)
 
     def of_squashed(self, space: Any) -> tuple[_Array, _Array]:
-        """Return middle and half width, (n,), of the env's actions over a bounded model space."""
+        """Return middle and half width, (n,), of the env's actions for a bounded model space."""
         box = cast("Box[Any]", space)
         low, high = box.low.astype(np.float64), box.high.astype(np.float64)
         return (self.middle + self.half * (0.5 * (low + high)), self.half * (0.5 * (high - low)))
@@ -87,7 +87,7 @@ def learners_space(space: Any) -> Box[np.float32]:
 
 
 def require_ranges(env: str, space: Any, layout: Layout) -> None:
-    """Refuse actions whose range is unknown, or is not the one that their layout states."""
+    """Refuse actions whose range is unknown or differs from their layout."""
     box = cast("Box[Any]", space)
     names = [feature.name for feature in layout for _ in range(feature.size)]
     for name, low, high, stated_low, stated_high in zip(

@@ -33,12 +33,13 @@ class Job:
     """A function call to run in a separate process.
 
     Attributes:
-        name: Its unique name.
+        name: Unique name of the job.
         function: Called with `arguments` and a `ReportSteps`; a module-level function, so that
             another process can import it.
-        arguments: Its arguments; must be picklable.
-        after: Names of the jobs that must end before it starts.
-        attempts: Most attempts if its process is lost; a job that raises is not repeated.
+        arguments: Arguments of the function; must be picklable.
+        after: Names of the jobs that must end before this one starts.
+        attempts: Maximum number of attempts if the job's process is lost; a job that raises is not
+            repeated.
     """
 
     name: str
@@ -54,13 +55,13 @@ the failure or None, and for "lost" how the process was lost."""
 
 
 class Executor:
-    """Runs jobs, each after those that it depends on.
+    """Runs jobs in the order of their dependencies.
 
-    A job that fails does not stop the others, except those that need its result. A job is repeated
-    if its process is lost. Subclasses define where jobs run.
+    If a job fails, only the jobs that need its result are skipped. A job is repeated if its process
+    is lost. Subclasses define where jobs run.
     """
 
-    # Number of jobs that run at the same time; None for all.
+    # Maximum number of jobs that run at the same time; None for no limit.
     _most: int | None = None
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
@@ -68,15 +69,15 @@ class Executor:
 
         Args:
             jobs: The jobs.
-            on_progress: Called with the progress of each.
+            on_progress: Called with the progress of each job.
 
         Raises:
-            FailedRuns: If jobs have failed; all others are complete.
-            OutputError: If a job could not write its result; the others are ended.
+            FailedRuns: If jobs have failed; all jobs that do not depend on them are complete.
+            OutputError: If a job could not write its result; all other jobs are stopped.
         """
         waiting, running = list(jobs), dict[str, Job]()
         ended = {name for job in jobs for name in job.after} - {job.name for job in jobs}
-        failed: dict[str, list[str]] = {}  # Names of jobs by reason.
+        failed: dict[str, list[str]] = {}  # Names of the failed jobs, keyed by reason.
         steps, lost = Counter[str](), Counter[str]()
         self._open(on_progress)
         try:
@@ -109,7 +110,7 @@ class Executor:
                         content = f"its process was lost {times} with {content}"
                     reason = str(content).strip().rstrip(".")
                     failed.setdefault(reason, []).append(name)
-                    # At once, because the others may take hours.
+                    # Logged at once, because the other jobs may take hours.
                     _log.error("%s failed: %s", name, reason.rpartition("\n")[2])
         finally:
             self._close()
@@ -129,15 +130,15 @@ class Executor:
         raise NotImplementedError
 
     def _events(self) -> Iterable[Event]:
-        """Wait for events of the jobs that run, and return them."""
+        """Wait for events of the running jobs, and return them."""
         raise NotImplementedError
 
     def _close(self) -> None:
-        """End all jobs that still run."""
+        """Stop all jobs that are still running."""
 
 
 def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
-    """Return a callback that forwards only some of the numbers: a run makes thousands."""
+    """Return a callback that forwards at most one report of steps every `every_s` seconds."""
     last = 0.0
 
     def forward(steps: int) -> None:
@@ -153,7 +154,7 @@ def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
 def failure_of(
     function: Callable[..., None], arguments: tuple[Any, ...], report: ReportSteps
 ) -> ShapechangerError | str | None:
-    """Perform a job for another process; return its error or its traceback, None if it ended."""
+    """Perform a job; return its error or traceback, or None if it succeeds."""
     try:
         function(*arguments, report)
     except ShapechangerError as error:
@@ -164,7 +165,7 @@ def failure_of(
 
 
 class Serial(Executor):
-    """Runs jobs one after another in this process, for debugging; raises what the first raises."""
+    """Runs jobs one after another in this process, for debugging; raises a job's exception."""
 
     _most = 1
 
@@ -187,7 +188,7 @@ class Serial(Executor):
 class Processes(Executor):
     """Runs jobs in worker processes of this machine, which end with their parent.
 
-    Processes are spawned, not forked: a script that calls this must guard its start with
+    Processes are spawned, not forked: a script that uses this class must guard its entry point with
     `if __name__ == "__main__":`.
 
     Args:
@@ -239,7 +240,7 @@ def _worker() -> tuple[Connection, BaseProcess]:
 
 
 def _end(connection: Connection, process: BaseProcess) -> int | None:
-    """End a worker, and return its exit code; negative for a signal."""
+    """End a worker, and return its exit code, which is negative for a signal."""
     process.terminate()
     process.join()
     connection.close()
@@ -248,7 +249,7 @@ def _end(connection: Connection, process: BaseProcess) -> int | None:
 
 def _serve(connection: Connection) -> None:
     """Run jobs as they arrive, until the parent is gone."""
-    # Ctrl-C reaches every process of the terminal; the parent handles it.
+    # Ctrl-C reaches every process of the terminal, and the parent ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     report = throttled(lambda steps: connection.send(("steps", steps)), _REPORT_EVERY_S)
@@ -271,9 +272,9 @@ def _end_with_parent() -> None:
 def use_one_thread() -> None:
     """Limit PyTorch in this process to one thread.
 
-    Networks this small gain nothing from more threads, several runs share the machine, and with
-    another number of threads sums are rounded differently.
+    More threads do not make small networks faster, several runs share the machine, and the rounding
+    of sums depends on the number of threads.
     """
-    import torch  # It takes seconds to load, and plans and reports need none of it.
+    import torch  # Takes seconds to load, and plans and reports do not need it.
 
     torch.set_num_threads(1)

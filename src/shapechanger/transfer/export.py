@@ -1,7 +1,7 @@
-"""Export trained policies as ONNX, from their env's own observations to its own actions.
+"""Export trained policies as ONNX, from the env's observations to its actions, in its units.
 
-The metadata has the names of the layouts and the card, so that a program without Shapechanger can
-read the meaning of each number.
+The metadata contains the names of the layouts and the card, so that a program without Shapechanger
+can read the meaning of each number.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from shapechanger.transfer.transplant.model import check_supported
 def export_onnx(policy: TrainedPolicy, path: Path) -> None:
     """Write a policy as ONNX.
 
-    Its input `observation` is float64 of shape (n, observations), as the env returns it, and its
-    output `action` float32 of shape (n, actions), as the env takes it.
+    The input `observation` is float64 of shape (n, observations), as the env returns it. The output
+    `action` is float32 of shape (n, actions), in the units of the env.
 
     Args:
         policy: The policy.
@@ -39,7 +39,7 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
 
     Raises:
         MissingExtra: If onnx or onnxscript is not installed.
-        StudyError: If its network is not the `MlpPolicy` of PPO, SAC or TQC.
+        StudyError: If the policy's network is not the `MlpPolicy` of PPO, SAC or TQC.
         OutputError: If the file cannot be written.
     """
     try:
@@ -50,7 +50,7 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
 
 
 def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, path: Path) -> None:
-    """Write a policy of limbs as ONNX for one body, whose rows are constants of the graph.
+    """Write a policy of limbs as ONNX for one body, whose description is constant in the graph.
 
     Args:
         policy: The policy.
@@ -61,7 +61,7 @@ def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, pat
     Raises:
         MissingExtra: If onnx or onnxscript is not installed.
         TransplantError: If the body belongs to another family than the policy's.
-        StudyError: If it has more limbs than the policy has room for.
+        StudyError: If the body has more limbs than the policy has room for.
         OutputError: If the file cannot be written.
     """
     settings: Any = policy.card.settings
@@ -86,7 +86,7 @@ def _write(network: nn.Module, card: PolicyCard, path: Path) -> None:
 
 
 def _constant(module: nn.Module, **arrays: Any) -> None:
-    """Register arrays as buffers of a module, with their own precision."""
+    """Register arrays as buffers of a module without changing their precision."""
     for name, array in arrays.items():
         module.register_buffer(name, torch.as_tensor(np.asarray(array)))
 

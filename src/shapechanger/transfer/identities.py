@@ -1,4 +1,4 @@
-"""Versions of the env and the learner of a policy, keyed by "env" and "learner"."""
+"""Identities of the env and the learner of a policy, keyed by "env" and "learner"."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from shapechanger.errors import ForeignStudy
 from shapechanger.identity import Identity, identify_code, identify_env, texts_in
 
 Identities = dict[str, Identity]
-"""Identities by part."""
+"""Identities, keyed by part."""
 
 ENV: Final = "env"
-"""Part of the env in a policy's card."""
+"""Key of the env's identity in a policy's card."""
 LEARNER: Final = "learner"
-"""Part of the learner."""
+"""Key of the learner's identity."""
 NOTHING: Final = Identity()
-"""Identity of a part without a model and without own files."""
+"""Identity of a part that has neither a model nor custom files."""
 
 
 def known(identities: Mapping[str, Identity]) -> Identities:
-    """Return the parts that have a model or own files."""
+    """Return the identities of the parts that have a model or custom files."""
     return {part: each for part, each in identities.items() if each != NOTHING}
 
 
@@ -48,7 +48,7 @@ def identify(ref: EnvRef) -> Identity:
 
 
 def steady(ref: EnvRef, found: Identity) -> Identity:
-    """Return an identity without its model if the env draws another one each time it is made."""
+    """Return an identity, without its model if the env draws a new model each time it is made."""
     if not found.model or ref.id.startswith("shapechanger/"):
         return found
     with closing(single_body(ref).make()) as made:
@@ -57,7 +57,7 @@ def steady(ref: EnvRef, found: Identity) -> Identity:
 
 
 def single_body(ref: EnvRef) -> EnvRef:
-    """Return the env of one body, if a reference has many bodies."""
+    """Return the env without the argument `bodies`, so that it has a single body."""
     return EnvRef(ref.id, {name: v for name, v in ref.kwargs.items() if name != "bodies"})
 
 

@@ -20,24 +20,24 @@ from shapechanger.transfer.methods import load_method
 PLAN_FILE: Final = "plan.json"
 """Name of the file of a plan in the folder of its study."""
 ARMS: Final = ("scratch", "zero-shot", "fine-tune")
-"""Arms that every pair of envs can be compared by."""
+"""Arms that are available for every pair of envs."""
 SOURCE: Final = "source"
 """Kind of the runs that train a source policy."""
 NO_SKILL: Final = ("random", "zero-action")
-"""Kinds of the runs without a policy, which give the zero of scores."""
-# The index in this tuple determines the seeds of a kind; seeds of other methods follow from their
-# names.
+"""Kinds of the runs without a policy, which define the zero of scores."""
+# The seeds of a kind of run derive from its index in this tuple; the seeds of other methods derive
+# from their names.
 _KINDS: Final = (SOURCE, "random", *ARMS, "randomised", "identified", "zero-action")
 # Welch's interval needs two seeds of each arm.
 _MIN_SEEDS: Final = 2
 
 
 class TransferTask(msgspec.Struct, frozen=True):
-    """Train in the source, transfer to the target.
+    """The two envs of a transfer.
 
     Attributes:
         source: The env that the policy is trained in.
-        target: The env that it is transferred to.
+        target: The env that the policy is transferred to.
     """
 
     source: EnvRef
@@ -49,35 +49,35 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         task: Source and target.
-        body_map: Map between their layouts.
+        body_map: Map between the layouts of source and target.
         measure: Quantity by which runs are compared: the name of a measure of the target, of one of
             its reward terms, or "return".
         unit: Unit of the measure.
         learner: Name of the learner.
-        settings: Its settings, the same in every arm.
+        settings: Settings of the learner, the same in every arm.
         steps: Target steps of each run of scratch and fine-tune.
         source_steps: Training steps of each source policy.
         own_steps: Training steps of methods that train their own policy in the source, such as
-            identified, in addition to a given source policy; 0 for `source_steps`.
+            identified, if a source policy is given; 0 for `source_steps`.
         seeds: Number of runs of each arm.
-        arms: The arms, by the names of their methods; scratch is always one, because the others are
+        arms: Names of the methods to compare; scratch is always included, because all others are
             compared with it.
         seed: The seed from which the seeds of all runs are drawn.
         source_policy: SHA-256 of the given policy file; empty if the study trains one for each
             seed.
         last_k: Number of final evaluations that count as the end of a run.
-        exclusive: Whether only one run at a time may use the target, as a robot.
+        exclusive: Whether only one run at a time may use the target, such as a robot.
         individual: Argument of the target that selects an individual, a different one for each
             seed; empty if there is only one target.
         versions: Version of each package that the numbers depend on; a study cannot be resumed
-            with others.
-        identity: Version of source, target, learner and methods, see
-            `shapechanger.transfer.versions`; a study cannot be resumed with others.
+            with other versions.
+        identity: Identities of source, target, learner and methods, see
+            `shapechanger.transfer.versions`; a study cannot be resumed with other identities.
 
     Raises:
-        StudyError: If there are fewer than two seeds, or nothing to compare, or the seed is not a
-            whole number from 0 to 2^32 - 1.
-        UnknownName: If there is no such method.
+        StudyError: If there are fewer than two seeds, scratch or a second arm is missing, or the
+            seed is not a whole number from 0 to 2^32 - 1.
+        UnknownName: If an arm is not the name of a method.
     """
 
     task: TransferTask
@@ -108,17 +108,17 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         for arm in self.arms:
             load_method(arm)
         if len(set(self.arms)) != len(self.arms):
-            raise StudyError(f"Each arm is named once, got {', '.join(self.arms)}.")
+            raise StudyError(f"Each arm must be named once, got {', '.join(self.arms)}.")
         if "scratch" not in self.arms or len(self.arms) < 2:
             raise StudyError("A study compares scratch with at least one other arm.")
 
     def runs(self) -> tuple[Run, ...]:
-        """Every run of the study; those that others depend on come first."""
+        """Return every run of the study, each after the runs that it depends on."""
         given = bool(self.source_policy)
         wanted = [*NO_SKILL, *self.arms]
         if not given and any(load_method(arm).uses_source_policy for arm in self.arms):
             wanted.insert(0, SOURCE)
-        # A given policy has the same result in every run, and so has the zero action.
+        # Every run of a given policy has the same result, and so has every run of the zero action.
         once = set[str]() if self.individual else {"zero-action"}
         if given and not self.individual:
             once.add("zero-shot")
@@ -127,26 +127,26 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         )
 
     def seed_of(self, run: Run) -> int:
-        """The seed of a run, independent of the other runs and of their number."""
+        """Return the seed of a run, which does not depend on the other runs or their number."""
         known = run.kind in _KINDS
         kind = _KINDS.index(run.kind) if known else zlib.crc32(run.kind.encode())
         entropy = np.random.SeedSequence(self.seed, spawn_key=(kind, run.index))
         return int(entropy.generate_state(1)[0] >> 1)
 
     def target_of(self, run: Run) -> EnvRef:
-        """The target of a run, with the individual that its index selects, if there are several."""
+        """Return the target of a run; if there are several individuals, its index selects one."""
         if not self.individual:
             return self.task.target
         return self.task.target.having({self.individual: run.index})
 
     def last_step_of(self, kind: str) -> int:
-        """The step of the last evaluation of a kind of run."""
+        """Return the step of the last evaluation of a kind of run."""
         if kind == SOURCE:
             return self.source_steps
         return self.steps if kind not in NO_SKILL and load_method(kind).learns_on_target else 0
 
     def source_steps_of(self, kind: str) -> int:
-        """Source steps of the policy that an arm begins with, or trains itself."""
+        """Return the source steps of the policy that an arm starts from or trains itself."""
         own = self.own_steps and not load_method(kind).uses_source_policy
         return self.own_steps if own else self.source_steps
 
@@ -155,15 +155,15 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         return kind == SOURCE or (kind not in NO_SKILL and load_method(kind).trains)
 
     def steps_of(self, kind: str) -> int:
-        """Env steps that a kind of run trains for, on any body."""
+        """Return the training steps of a kind of run, in the source or the target."""
         if not self.trains(kind):
             return 0
         return self.last_step_of(kind) or self.source_steps_of(kind)
 
     def extends(self, other: Plan) -> bool:
-        """Return whether this is the other study with more seeds or arms, or both.
+        """Return whether this plan only adds seeds or arms to the other one.
 
-        The runs of the other study then count here, because no run depends on another arm.
+        This plan then includes the runs of the other one, because no run depends on another arm.
         """
         added = {f"method {arm}" for arm in {*self.arms} - {*other.arms}}
         identity = {part: each for part, each in self.identity.items() if part in added}
@@ -174,17 +174,18 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         return more and grown == self != other
 
     def difference(self, other: Plan) -> str:
-        """Names of the fields in which two plans differ; empty if they are equal."""
+        """Return the names of the fields in which two plans differ; empty if they are equal."""
         mine: dict[str, Any] = msgspec.structs.asdict(self)
         theirs: dict[str, Any] = msgspec.structs.asdict(other)
         return ", ".join(name for name in mine if mine[name] != theirs[name])
 
 
 class Run(msgspec.Struct, frozen=True):
-    """One training, or one evaluation: the unit of work, and of the statistics.
+    """One training or one evaluation, which is one sample in the statistics.
 
     Attributes:
-        index: Index of its seed, from 0.
+        kind: Name of a method, "source", "random" or "zero-action".
+        index: Index of the run's seed, from 0.
     """
 
     kind: str
@@ -200,7 +201,7 @@ class Run(msgspec.Struct, frozen=True):
         return study / "runs" / self.name
 
     def policy_file(self, study: Path) -> Path:
-        """The file of its policy in the folder of a study."""
+        """File of the run's policy inside a study's folder."""
         return self.folder(study) / "policy.safetensors"
 
 

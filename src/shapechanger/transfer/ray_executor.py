@@ -1,8 +1,8 @@
 """Run the jobs of a study on a Ray cluster.
 
-The study's folder must be on a file system that all nodes share, and the package be installed on
-each of them. Ray sends Python objects between its nodes by pickle, so a cluster must be one that
-only its users can reach.
+The study's folder must be on a file system that all nodes share, and the package must be installed
+on each node. Ray sends pickled Python objects between its nodes, so only trusted users may have
+access to the cluster.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ _ray: Any = ray
 class RayCluster(Executor):
     """Runs jobs on the nodes of a Ray cluster, one job per core.
 
-    A job whose worker or node is lost is repeated on another.
+    If the worker or the node of a job is lost, the job is repeated on another worker.
 
     Args:
-        address: Address of a running cluster, such as `10.0.0.1:6379`, or "auto" for the one that
-            this machine is a node of; None to start Ray on this machine for the time of the study.
+        address: Address of a running cluster, such as `10.0.0.1:6379`, or "auto" for this machine's
+            cluster; None to start Ray on this machine for the duration of the study.
     """
 
     def __init__(self, address: str | None = None) -> None:
@@ -57,7 +57,7 @@ class RayCluster(Executor):
                 reason = (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
                 raise _no_answer(self._address or "this machine", reason) from error
         self._names: dict[Any, str] = {}
-        # On the node of this program, because other nodes may be lost.
+        # The board of progress runs on the node of this program, because other nodes may be lost.
         here = NodeAffinitySchedulingStrategy(_ray.get_runtime_context().get_node_id(), soft=False)
         board = _ray.remote(num_cpus=0, max_restarts=-1, scheduling_strategy=here)(_Board)
         self._board: Any = board.remote()
@@ -69,7 +69,7 @@ class RayCluster(Executor):
 
     def _events(self) -> Iterable[Event]:
         done, _ = _ray.wait(list(self._names), timeout=_REPORT_EVERY_S)
-        # The board may be being restarted; a study goes on without progress.
+        # While the board restarts, no progress is reported.
         with suppress(RayError):
             found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_ANSWER_S)
             for name in found.keys() & set(self._names.values()):
@@ -89,10 +89,12 @@ class RayCluster(Executor):
 
 
 def _require_answer(address: str) -> None:
-    """Refuse an address at which no Ray answers; Ray itself would try for half a minute."""
+    """Refuse an address where nothing listens; Ray itself would retry for half a minute."""
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit() or "/" in host:
-        raise StudyError(f"The address of a Ray cluster is HOST:PORT or auto, not {address!r}.")
+        raise StudyError(
+            f"The address of a Ray cluster must be HOST:PORT or auto, got {address!r}."
+        )
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECT_S).close()
     except (OSError, OverflowError) as error:

@@ -1,6 +1,6 @@
 """The runs of a study, each in its own process, and their results.
 
-Everything random in a run follows from its own seed.
+All random numbers of a run derive from the seed of the run.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ class RunResult(msgspec.Struct, frozen=True):
 
     Attributes:
         run: The run.
-        seed: Its seed.
-        curve: Its evaluations, by steps.
-        wall_s: Duration, s; the only number here that another machine would not reproduce.
+        seed: Seed of the run.
+        curve: Evaluations of the run, in the order of their steps.
+        wall_s: Duration, s; the only value here that is not reproducible.
         device: The device that trained: "CPU", or the name of a GPU; empty without training.
-        identity: Version of everything that it depends on, from its plan.
+        identity: Identities of the parts that the run depends on, from the plan.
     """
 
     run: Run
@@ -59,7 +59,7 @@ def learner_of(name: str, settings: LearnerSettings) -> Learner[Any]:
 
 
 def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
-    """Load the result of a run; None if it has not ended, or its policy is missing."""
+    """Load the result of a run; None if the run has not ended or its policy is missing."""
     path = run.folder(study) / _RESULT
     if not path.exists() or (plan.trains(run.kind) and not run.policy_file(study).exists()):
         return None
@@ -71,7 +71,7 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
         raise CorruptStudy(f"{path} does not hold the result of {run.name}: {remedy}.")
     if text := differences(plan, result.identity, parts_of(plan, run)):
         raise ForeignStudy(
-            f"{path} is the result of another version than the one planned. {text}. Give another "
+            f"{path} is the result of another version than the planned one. {text}. Give another "
             f"--out, or {remedy}."
         )
     return result
@@ -88,7 +88,7 @@ def last_evaluation(study: Path, run: Run) -> Evaluation | None:
 
 
 def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: ReportSteps) -> None:
-    """Perform a run, deleting an earlier attempt except the parts that its method saved."""
+    """Perform a run; files of an earlier attempt are deleted, except those of its method."""
     use_one_thread()
     require_planned(plan, run)
     folder = run.folder(Path(study))

@@ -60,16 +60,16 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     """Result of a study.
 
     Attributes:
-        plan: Its plan.
-        command: The command that ran it; empty if it was called from Python.
-        machine: The machine that it ran on.
+        plan: Plan of the study.
+        command: The command that ran the study; empty if it was called from Python.
+        machine: Operating system and processor architecture of the machine.
         shift: The certificate of the shift as text; empty if the envs publish none.
         runs: Every run with its learning curve.
         source_return: Mean return of the source policies in the source, one for each seed; empty
             if a policy was given.
-        summaries: The measures of each arm but scratch.
-        looks: Numbers of seeds at which the result was computed, the present one last. More than
-            one means that seeds were added when results could be seen.
+        summaries: Measures of transfer of each arm except scratch.
+        looks: Numbers of seeds at which the result was computed, the present one last. With more
+            than one, seeds were added after results had been computed.
     """
 
     plan: Plan
@@ -83,7 +83,7 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def headline_arm(self) -> str:
-        """The arm that is compared with scratch first: fine-tune, else the first that learns."""
+        """The arm that is compared with scratch first: fine-tune, or else the first that learns."""
         if "fine-tune" in self.summaries:
             return "fine-tune"
         learning = (arm for arm in self.summaries if self.curves(arm).n_evals > 1)
@@ -133,8 +133,8 @@ def inspect_task(task: TransferTask) -> TaskTraits:
 def default_arms(traits: TaskTraits) -> tuple[str, ...]:
     """Return the arms of a study that names none.
 
-    Source adaptation helps where source and target are the same task, that is, where their layouts
-    are equal.
+    The arms that adapt the source are included if the target supports them and both envs have equal
+    layouts, so that they are the same task.
     """
     adapts = traits.target.adapts_source and traits.source.same_layouts(traits.target)
     return (*ARMS, *_ADAPTED) if adapts else ARMS
@@ -162,26 +162,26 @@ def make_plan(
     Args:
         task: Source and target.
         learner: Name of the learner.
-        settings: Its settings.
+        settings: Settings of the learner.
         seeds: Number of runs of each arm, at least 2.
         steps: Target steps of a run; None for the learner's default.
-        source_steps: Source steps of a source policy; None for the learner's default. Next to a
-            given one, the steps of arms that train their own policy.
+        source_steps: Source steps of a source policy; None for the learner's default. If a source
+            policy is given, the steps of arms that train their own policy.
         source_policy: File of a given source policy; None to train one for each seed.
-        arms: The arms to compare, by the names of their methods.
+        arms: Names of the methods to compare.
         seed: The seed from which the seeds of all runs are drawn.
         rules: Rules of the body map for entries without a partner, see `BodyMap.between`.
         map_text: The body map as TOML, instead of `rules` and `units`.
         units: "same" or "torque", see `BodyMap.between`.
         measure: Name of a measure of the target, of one of its reward terms, or "return"; empty
             for the target's default.
-        traits: What `inspect_task` returned for the task; None to inspect it now.
+        traits: Result of `inspect_task` for the task; None to inspect it now.
 
     Raises:
         UnknownName: If an env, an arm, a measure or a feature does not exist.
         MapError: If the spaces cannot be mapped.
-        StudyError: If the budget or the number of seeds is too small, the given policy is of
-            another kind of learner, or an env lacks what the learner needs.
+        StudyError: If the budget or the number of seeds is too small, the given policy belongs to
+            another kind of learner, or an env does not fulfil the learner's requirements.
         PolicyError: If the given policy is missing, corrupt or refused.
         SpaceMismatch: If the given policy belongs to another body, or a layout does not fit its
             space.
@@ -204,7 +204,7 @@ def make_plan(
         if origin.env != task.source:
             raise SpaceMismatch(
                 f"The given policy was trained in {origin.env}, and the source is {task.source}: "
-                "name the env and the body that it was trained in."
+                "name the env and the body of its training."
             )
         require_same_env(
             origin.identity,
@@ -257,7 +257,7 @@ def make_plan(
 
 
 def _measure(env: EnvRef, target: EnvTraits, name: str) -> Measure:
-    """Return a measure of the target, or one of its reward terms; unchecked for a robot."""
+    """Return a measure or reward term of the target; a robot's reward terms are not checked."""
     known = {measure.name: measure for measure in target.measures}
     if not name or name in known:
         return known[name] if name else target.measures[0]
@@ -285,28 +285,28 @@ def run_study(
 ) -> Study:
     """Perform the runs of a plan that are missing in `out`, and return the result.
 
-    A run that was cut off starts again, so a study that was killed ends with the same numbers as
-    one that was not.
+    An interrupted run starts again, so an interrupted study ends with the same numbers as an
+    uninterrupted one.
 
     Args:
         plan: The plan.
         out: Folder of the study; made if missing.
-        source_policy: The file that `plan.source_policy` is the digest of.
+        source_policy: File of the given policy, whose digest must equal `plan.source_policy`.
         executor: Executor of the runs; None for processes on this machine.
         on_progress: Called with the name of a run, its steps so far and whether it has ended.
         command: The command that repeats the study.
-        traits: What `inspect_task` returned for the task; None to inspect it now.
-        looked: Numbers of seeds at which parts of this study were evaluated elsewhere.
+        traits: Result of `inspect_task` for the task; None to inspect it now.
+        looked: Numbers of seeds at which parts of this study were evaluated in other folders.
 
     Raises:
         EmptyShift: If source and target do not differ.
         OutputError: If `out` cannot be written; finished runs are kept.
-        ForeignStudy: If `out` holds another study, or something else.
+        ForeignStudy: If `out` contains another study or other files.
         CorruptStudy: If a file in `out` cannot be read.
-        FailedRuns: If runs have failed; all others that do not need them have ended.
+        FailedRuns: If runs have failed; all runs that do not depend on them have ended.
     """
     if (_digest(source_policy) if source_policy else "") != plan.source_policy:
-        raise StudyError("The source policy is not the one that this study was planned with.")
+        raise StudyError("The source policy is not the policy that the plan names.")
     traits = inspect_task(plan.task) if traits is None else traits
     claim_folder(plan, out)
     jobs: list[Job] = []
@@ -314,7 +314,7 @@ def run_study(
         needs = run.kind in plan.arms and load_method(run.kind).uses_source_policy
         after = [Run(SOURCE, run.index).name] if needs and not plan.source_policy else []
         if plan.exclusive:
-            # No robot moves again once a run has failed.
+            # A robot must not move again after a run has failed.
             after += [job.name for job in jobs[-1:]]
         attempts = 1 if plan.exclusive else Job.attempts
         arguments = (plan, run, str(out), source_policy)
@@ -357,7 +357,7 @@ def unfinished_runs(plan: Plan, out: Path) -> tuple[Run, ...]:
 
 
 def is_folder_of(plan: Plan, out: Path) -> bool:
-    """Return whether `out` is the folder of this study, or of a part of it."""
+    """Return whether `out` is the folder of this study, perhaps with fewer seeds or arms."""
     if not (out / PLAN_FILE).exists():
         return False
     found = read_plan(out, _KEPT)
@@ -367,7 +367,7 @@ def is_folder_of(plan: Plan, out: Path) -> bool:
 def claim_folder(plan: Plan, out: Path) -> None:
     """Make `out` the folder of this study, or check that it already is.
 
-    A study can be resumed with more seeds or arms: no run depends on them.
+    A study can be resumed with more seeds or arms, because the finished runs do not depend on them.
     """
     make_folder(out)
     path = out / PLAN_FILE

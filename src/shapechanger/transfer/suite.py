@@ -1,7 +1,7 @@
 """Suites: several studies that share the runs of their targets and sources.
 
 Training from scratch on a target does not depend on the source, and a source policy does not depend
-on the target; the seed of a run depends on its kind and index only. So a study copies such runs
+on the target. The seed of a run depends on its kind and index only. So a study copies these runs
 from the finished studies of its suite.
 """
 
@@ -35,8 +35,12 @@ class StudyOutcome(msgspec.Struct, frozen=True):
     """Outcome of one study of a suite, in steps on the target.
 
     Attributes:
+        final: Mean measure of scratch at its last evaluation.
         zero_shot: Measure of the source policy without training; None if that arm is missing.
+        arm_final: Mean measure of `arm` at its last evaluation.
+        scratch_steps: Steps at which scratch first reaches `final`.
         arm_steps: Steps at which `arm` first reaches `final`; None if it never does.
+        arm: The arm that is compared with scratch.
     """
 
     name: str
@@ -57,7 +61,7 @@ class StudyOutcome(msgspec.Struct, frozen=True):
 
 
 def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
-    """Make a study's folder in `out`, and copy the runs that it shares with other studies there."""
+    """Make a study's folder in `out`, and copy the runs that it shares with its siblings."""
     make_folder(out)
     folder = out / name
     claim_folder(plan, folder)
@@ -68,7 +72,7 @@ def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
 
 
 def merge_study(folders: Sequence[Path], out: Path) -> Plan:
-    """Copy the finished runs of one study, done in several folders, into one."""
+    """Copy the finished runs of one study from several folders into one folder."""
     plans = [read_plan(one, f"leave out {one}") for one in folders]
     arms = tuple(dict.fromkeys(arm for plan in plans for arm in plan.arms))
     seeds = max(plan.seeds for plan in plans)
@@ -93,8 +97,8 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
                 kept = found
             elif found.curve != kept.curve:
                 raise CorruptStudy(
-                    f"The result of {run.name} in {folder} is not the one in {out}: delete one of "
-                    "them. Processors that round differently can be the reason."
+                    f"The result of {run.name} in {folder} differs from the one in {out}: delete "
+                    "one. Processors that round differently can be the reason."
                 )
     return whole
 
@@ -165,7 +169,7 @@ def study_outcome(name: str, study: Study) -> StudyOutcome:
 
 
 def _first_at(curves: LearningCurves, level: float) -> float | None:
-    """Steps at which the mean over seeds first reaches a level; None if it never does."""
+    """Return the steps at which the mean over seeds first reaches a level; None if never."""
     mean = LearningCurves(curves.steps, curves.returns.mean(axis=0, keepdims=True))
     steps = float(steps_to_reach(mean, level)[0])
     return steps if math.isfinite(steps) else None

@@ -1,7 +1,7 @@
-"""Versions of a study's parts, and the differences between two studies.
+"""Identities of the parts of a study, and the differences between two studies.
 
-Identities are kept by the part that something plays: "source" and "target", "learner", and "method
-NAME" for each arm. Parts without a model and without own files have none.
+The keys are "source", "target", "learner", and "method NAME" for each arm. A part that has neither
+a model nor custom files has no identity.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def parts_of(plan: Plan, run: Run) -> Identities:
 
 
 def changes_between(old: Plan, new: Plan) -> str:
-    """Describe how the common parts of two plans differ; empty if they do not."""
+    """Describe how the common parts of two plans differ; empty if they are equal."""
     mine, theirs = ({"source": p.task.source, "target": p.task.target} for p in (new, old))
     common = [(f"{mine[a]}", a, b) for a in mine for b in theirs if mine[a] == theirs[b]]
     if (new.learner, new.settings) == (old.learner, old.settings):
@@ -58,7 +58,7 @@ def changes_between(old: Plan, new: Plan) -> str:
 
 
 def differences(plan: Plan, old: Identities, new: Identities) -> str:
-    """Describe how parts of a plan differ; empty if they do not."""
+    """Describe how identities of a plan's parts differ; empty if they are equal."""
     titles = {"source": f"{plan.task.source}", "target": f"{plan.task.target}"}
     changed = {
         titles.get(part, f"the {part}"): old.get(part, NOTHING).changes_to(new.get(part, NOTHING))
@@ -78,11 +78,11 @@ def require_planned(plan: Plan, run: Run) -> None:
     found = {part: each for part, each in code.items() if part in parts}
     for part, ref in (("source", plan.task.source), ("target", plan.task.target)):
         if part in parts:
-            # A robot is not connected to once more.
+            # Do not connect to a robot a second time.
             is_robot = plan.exclusive and part == "target"
             found[part] = parts[part] if is_robot else identify(ref)
     if text := differences(plan, parts, found):
         raise ForeignStudy(
-            f"What this study was planned with has changed. {text}. Restore it and run the same "
-            "command again, or start again with another --out."
+            f"An env or code of this study has changed since its plan. {text}. Restore it and run "
+            "the same command again, or start again with another --out."
         )

@@ -138,7 +138,7 @@ def test_what_does_not_fit_is_refused() -> None:
         each_body(EnvRef("shapechanger/Finger-v1", {"bodies": {}}))
     with pytest.raises(StudyError, match="A reset cannot change the body behind its rows"):
         _limb_env().reset(options={"body": "BigAnt"})
-    with pytest.raises(StudyError, match="These bodies sense different things"):
+    with pytest.raises(StudyError, match="These bodies have different columns"):
         rows_of_each([ANT, EnvRef("shapechanger/HalfCheetah-v1")])
     with pytest.raises(TransplantError, match="another family than shapechanger/HalfChe"):
         fitted(gym.make("shapechanger/HalfCheetah-v1"), _limb_env().observation_layout)
@@ -165,7 +165,7 @@ def test_strange_layouts_are_refused() -> None:
     motor = Feature("flap/motor", "1", -1.0, 1.0, Element("actuator", "flap"))
     hip = Feature("hip_1/motor", "1", -1.0, 1.0, Element("actuator", "hip_1"))
     assert rows_of(_Strange(ANT.make(), goal, hip)).columns.trunk == ("goal/x",)
-    with pytest.raises(LayoutError, match="wing/angle belongs to no limb of the body"):
+    with pytest.raises(LayoutError, match="wing/angle must belong to a limb or the trunk"):
         rows_of(_Strange(ANT.make(), wing, hip))
     with pytest.raises(LayoutError, match="the action 'flap' moves no limb"):
         rows_of(_Strange(ANT.make(), goal, motor))

@@ -98,7 +98,7 @@ def test_what_it_refuses() -> None:
     learner = RslLearner("rsl-ppo", SETTINGS)
     with pytest.raises(StudyError, match="takes no callback"):
         learner.train(PENDULUM, 2048, 0, callback=object(), on_evaluation=print)
-    with pytest.raises(StudyError, match="smaller than one evaluation"):
+    with pytest.raises(StudyError, match="is too small"):
         learner.train(PENDULUM, 512, 0, on_evaluation=print)
 
 

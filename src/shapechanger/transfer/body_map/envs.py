@@ -24,12 +24,12 @@ def body_map(
 
     Args:
         source_env: The env that a policy was trained in.
-        target_env: The env that it acts in.
+        target_env: The env that the policy acts in.
         **options: Rules, `otherwise` and `units`, see `BodyMap.between`.
 
     Raises:
         LayoutError: If an env publishes no layouts.
-        MapError: If the two cannot be mapped.
+        MapError: If the two envs cannot be mapped.
         UnknownName: If a rule matches no feature, or copies one that does not exist.
     """
     ours, theirs = layouts_of(source_env), layouts_of(target_env)
@@ -37,18 +37,18 @@ def body_map(
 
 
 class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstructorArgs):
-    """Target env in which a policy of the source acts unchanged.
+    """Target env with the observations and actions of the source, for a policy of the source.
 
-    Observations and actions are the source body's, observations in float64, actions in float32,
-    with the ranges of their layouts. Rewards, terminations and infos are the target's.
+    Observations are float64 and actions are float32, with the ranges of the source's layouts.
+    Rewards, terminations and infos come from the target.
 
     Attributes:
         body_map: Map between the two bodies.
 
     Args:
         env: The target env.
-        body_map: Map between the bodies, or its JSON, so that Gymnasium can serialise the spec; it
-            cannot serialise spaces.
+        body_map: Map between the bodies, or its JSON; Gymnasium can serialise a spec with the JSON,
+            but not with a map.
 
     Raises:
         SpaceMismatch: If a space of the target does not have the size of its layout.
@@ -99,7 +99,7 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
 
 
 def check_size(which: str, space: Any, layout: Layout) -> Box[Any]:
-    """Return the space if it is flat and of the size of its layout."""
+    """Return the space if it is flat and has the size of its layout; raise otherwise."""
     if not isinstance(space, Box) or space.shape != (layout.size,):
         raise SpaceMismatch(
             f"The layout of the {which} has {layout.size} numbers, so its space must be a Box of "

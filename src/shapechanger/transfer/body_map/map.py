@@ -53,7 +53,7 @@ def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tu
 
 
 def _invert_entries(half: Half, otherwise: RuleLike) -> tuple[MapEntry, ...]:
-    """Return for each feature of `over` a rule over `into`, which recovers it from its copies."""
+    """Return a rule for each feature of `over` that recovers it from its copies in `into`."""
     result: list[MapEntry] = []
     for feature in half.side.over:
         name = feature.name
@@ -67,8 +67,8 @@ def _invert_entries(half: Half, otherwise: RuleLike) -> tuple[MapEntry, ...]:
             continue
         if len(takers) > 1 and name not in takers:
             raise MapError(
-                f"{name!r} is copied to {' and '.join(map(repr, takers))}, none of which has its "
-                "name: the inverse is not unique."
+                f"{name!r} is copied to {' and '.join(map(repr, takers))}, and none of them is "
+                f"named {name!r}: the inverse is not unique."
             )
         taker = name if name in takers else next(iter(takers))
         scale, why = takers[taker]
@@ -142,8 +142,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
     ) -> BodyMap:
         """Match the features of two bodies by name.
 
-        A rule under the exact name of a feature takes precedence, then the partner of the same
-        name, then the first glob that matches, then `otherwise`.
+        A feature gets the first of these rules that exists: the rule under its exact name; a copy
+        of the feature of the same name; the first glob that matches; `otherwise`.
 
         Args:
             source_observation: Layout of the source's observations.
@@ -152,11 +152,12 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             target_action: Layout of the target's actions.
             rules: Rules, keyed by the name or glob of source observation and target action
                 features. A rule is a `Copy`, `Zero`, `Hold` or `Learn`, or one of "zero", "hold"
-                (the middle of the range), "learn" and "copy NAME"; stars in NAME stand for what the
-                wildcards of the glob matched, as in `{"foot_*/motor": "copy ankle_*/motor"}`.
-            observation_rules: Rules of source observation features only; they take precedence.
-            action_rules: Rules of target action features only; they take precedence.
-            otherwise: The rule of features that nothing matches.
+                (the middle of the range), "learn" and "copy NAME"; stars in NAME are replaced by
+                the text that the glob's wildcards match, as in
+                `{"foot_*/motor": "copy ankle_*/motor"}`.
+            observation_rules: Rules of source observation features only; they override `rules`.
+            action_rules: Rules of target action features only; they override `rules`.
+            otherwise: The rule of features that no name and no glob matches.
             units: "same" passes action numbers on unchanged. "torque" scales them by source gain
                 over target gain, so that they give the same torque as in the source. "exact" uses
                 each scale and constant as given, without a check of units and ranges.
@@ -170,7 +171,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         on_observation, on_action = dict(observation_rules or {}), dict(action_rules or {})
         sensed = Side("observation", source_observation, target_observation)
         moved = Side("action", target_action, source_action)
-        # Special rules come first and are not overridden.
+        # The rules of one side come first, and `rules` does not override their values.
         observation = resolve(sensed, on_observation | shared | on_observation, otherwise, units)
         action = resolve(moved, on_action | shared | on_action, otherwise, units)
         check_patterns(shared, [(sensed, observation), (moved, action)])
@@ -184,8 +185,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         """Return the identity map of a body.
 
         Args:
-            observation: Layout of its observations.
-            action: Layout of its actions.
+            observation: Layout of the body's observations.
+            action: Layout of the body's actions.
         """
         entries = (
             tuple(MapEntry(name, Copy(name), SAME_NAME) for name in layout.names)
@@ -204,24 +205,24 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
     ) -> BodyMap:
         """Return the map of a body to its mirror image, which swaps left and right.
 
-        It is its own inverse. Before or after another map, `mirror.then(map)`, a policy of the
-        source acts as its mirror image. The element of a feature is the part of its name before the
-        first "/".
+        The map is its own inverse. Composed with another map, as in `mirror.then(map)`, it makes a
+        policy of the source act as its mirror image. The element of a feature is the part of its
+        name before the first "/".
 
         Args:
-            observation: Layout of its observations.
-            action: Layout of its actions.
+            observation: Layout of the body's observations.
+            action: Layout of the body's actions.
             swap: Partner of each element on the other side, such as `{"hip_1": "hip_4"}`, or of a
                 glob, such as `{"*_1": "*_4"}`; each pair appears once or both ways. Other elements
                 stay in place.
-            flip: Globs of elements whose coordinate changes sign, such as the hinges about a
-                vertical axis; both elements of a pair or neither. Components along axes of the
+            flip: Globs of elements whose coordinate changes sign, such as hinges about a vertical
+                axis; they match both elements of a pair or neither. Components along axes of the
                 world, such as `torso/vy`, are recognised by their names.
 
         Raises:
-            MapError: If the pairs contradict each other, one element of a pair flips and the other
-                does not, a feature is a block, two features that swap differ in unit, shape or
-                gain, or their ranges are no mirror images.
+            MapError: If the pairs contradict each other, only one element of a pair flips, a
+                feature is a block, or two features that swap differ in unit, shape or gain or do
+                not have mirrored ranges.
             UnknownName: If an element or the partner of a feature does not exist.
         """
         entries = mirrored_entries(observation, action, swap or {}, flip)
@@ -278,15 +279,16 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         return self._halves[1].offset
 
     def then(self, following: BodyMap) -> BodyMap:
-        """Compose: the map from this source to the target of `following`.
+        """Return the map from this map's source to the target of `following`.
 
-        The action bounds of the body in the middle no longer apply.
+        The action bounds of the intermediate body no longer apply.
 
         Args:
             following: A map whose source is the target of this one.
 
         Raises:
-            MapError: If the target of this map and the source of `following` mean different things.
+            MapError: If the layouts of this map's target and of the source of `following` differ in
+                names, order, units, shapes or gains.
         """
         for name, first, second in (
             ("observation", self.target_observation, following.source_observation),
@@ -307,22 +309,22 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         )
 
     def inverse(self, otherwise: RuleLike = Zero()) -> BodyMap:  # noqa: B008 - frozen.
-        """Invert: the map from this target back to this source.
+        """Return the map from this map's target back to its source.
 
-        A feature that was copied several times is recovered from the copy of the same name.
+        A feature that is copied several times is recovered from the copy of the same name.
 
         Args:
-            otherwise: The rule of a feature that was not copied: zero, hold or learn.
+            otherwise: The rule of a feature that is not copied: zero, hold or learn.
 
         Raises:
-            MapError: If a feature was copied several times, but not under its own name.
+            MapError: If a feature is copied several times, but not to a feature of the same name.
         """
         seen, sees, acted, acts = self.layouts
         entries = (_invert_entries(half, otherwise) for half in self._halves)
         return BodyMap(sees, seen, acts, acted, *entries)
 
     def table(self) -> tuple[MapRow, ...]:
-        """List each feature that is filled, its rule as text, and the origin of the rule."""
+        """Return each filled feature with its rule as text and the origin of the rule."""
         return tuple(
             MapRow(half.side.name, entry.feature, describe_rule(entry.rule), entry.why)
             for half in self._halves
@@ -339,7 +341,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         )
 
     def __repr__(self) -> str:
-        """Count the rules by kind."""
+        """Return the number of rules of each kind."""
         sides = ([type(e.rule).__name__ for e in side] for side in (self.observation, self.action))
         return "BodyMap(observation: {}; action: {})".format(*(dict(Counter(s)) for s in sides))
 
@@ -349,7 +351,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
 
     @classmethod
     def from_json(cls, text: str | bytes) -> BodyMap:
-        """Read what `to_json` wrote.
+        """Read a map from the JSON of `to_json`.
 
         Raises:
             MapError: If the text is not a body map.

@@ -23,9 +23,9 @@ Each part may be left out. Features with the same name in both bodies need no li
 The mirror is the plane y = 0, with x forward and z up. It changes the sign of the y component of a
 vector (position, velocity, force) and of the x and z components of an axial vector (angular
 velocity, torque). A rotation about the axis n becomes the rotation by the same angle about n with
-its y component kept and the others negated, so a quaternion (w, x, y, z) negates x and z. A hinge
-whose axis is mapped to the axis of its partner keeps its sign, and one whose axis is mapped to the
-opposite changes it: the caller states which those are.
+its y component kept and the others negated, so a quaternion (w, x, y, z) negates x and z. The angle
+of a hinge keeps its sign if the mirror maps the hinge's axis to the axis of its partner, and
+changes it if the mirror maps it to the opposite axis: the caller lists those hinges in `flip`.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ _COPY: Final = "copy "
 _WORDS: Final = ("zero", "hold", "learn", "copy NAME")
 _MOST_NAMES_LISTED: Final = 8
 _SPELLED: Final[dict[str, Rule]] = {"zero": Zero(), "learn": Learn()}
-# Last parts of feature names that are components along an axis of the world. The products of
-# inertia with y change sign; the cosine of an angle does not.
+# Last parts of feature names that change sign in the mirror: components along an axis of the world
+# and products of inertia with y. `_KEPT` has the last parts that keep their sign.
 _NEGATED: Final = frozenset({"y", "vy", "fy", "wx", "wz", "tx", "tz", "qx", "qz", "xy", "yz", "my"})
 _KEPT: Final = frozenset(
     {"x", "z", "vx", "vz", "fx", "fz", "wy", "ty", "qw", "qy", "xx", "yy", "zz", "xz", "mx", "mz"}
@@ -98,7 +98,7 @@ def _matches(pattern: str, name: str, side: Side) -> bool:
 def check_patterns(
     patterns: Iterable[str], halves: Sequence[tuple[Side, tuple[MapEntry, ...]]]
 ) -> None:
-    """Check that each pattern gave at least one feature its rule."""
+    """Check that each pattern provides the rule of at least one feature."""
     reasons = {entry.why for _, entries in halves for entry in entries}
     for pattern in patterns:
         if f"rule {pattern!r}" in reasons:
@@ -114,7 +114,7 @@ def check_patterns(
 
 
 def constant_rule(like: RuleLike, feature: Feature) -> Rule:
-    """Read a rule that copies nothing, for a remaining feature."""
+    """Return the rule of a feature that copies no other feature."""
     match like:
         case "hold":
             return Hold(feature.middle)
@@ -129,7 +129,7 @@ def constant_rule(like: RuleLike, feature: Feature) -> Rule:
             return like
         case _:
             raise MapError(
-                f"The rule of the remaining features is 'zero', 'hold' or 'learn', not {like!r}."
+                f"The rule of remaining features must be 'zero', 'hold' or 'learn', got {like!r}."
             )
 
 
@@ -154,7 +154,7 @@ def _read(like: RuleLike, pattern: str, feature: Feature, side: Side, units: Uni
 
 
 def _suited(rule: Rule, feature: Feature, side: Side, units: Units) -> Rule:
-    """Return the rule with its scale in the requested units, if it fits the feature."""
+    """Return the rule with its scale in the requested units; raise if it does not fit."""
     if not isinstance(rule, Copy):
         return rule
     copied, factor = side.copied(rule.feature), 1.0
@@ -303,7 +303,7 @@ def _both_ways(swap: Mapping[str, str], elements: tuple[str, ...]) -> dict[str, 
 
 
 def _fitting(glob: str, elements: tuple[str, ...]) -> list[str]:
-    """The element of this exact name, or else the elements that match it as a glob."""
+    """Return the element of this exact name, or else the elements that the glob matches."""
     fits = [glob] if glob in elements else [e for e in elements if fnmatch.fnmatchcase(e, glob)]
     if not fits:
         raise UnknownName("element", glob, elements)
@@ -334,7 +334,7 @@ def _check_pair(feature: Feature, partner: Feature, scale: float) -> None:
                 f"their {aspect} is {ours!r} and {theirs!r}."
             )
     low, high = sorted((scale * partner.low, scale * partner.high))
-    # Up to rounding, such as from degrees to radians.
+    # The ranges may differ by rounding, such as from degrees to radians.
     if not all(
         math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12)
         for a, b in ((low, feature.low), (high, feature.high))

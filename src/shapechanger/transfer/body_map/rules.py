@@ -25,9 +25,7 @@ from shapechanger.layout import Feature, Layout
 
 
 class Copy(msgspec.Struct, frozen=True, tag="take", omit_defaults=True):
-    """Copy another feature, times a scale.
-
-    Partners of the same name, copied siblings and mirror partners all use this rule.
+    """A copy of another feature, multiplied by a scale.
 
     Attributes:
         feature: Name of the feature that is copied; a block is copied as a whole.
@@ -107,7 +105,7 @@ _TOKEN: Final = re.compile(r"\[!?+\]?+[^\]]*\]|.", re.DOTALL)
 
 
 def expand_template(template: str, pattern: str, name: str) -> str:
-    """Replace each `*` of `template`, in order, by what a wildcard of `pattern` matches in `name`.
+    """Replace each `*` of `template`, in order, by the text that a wildcard of `pattern` matches.
 
     >>> expand_template("ankle_*/motor", "foot_*/motor", "foot_2/motor")
     'ankle_2/motor'
@@ -183,10 +181,10 @@ class Side(NamedTuple):
 
 
 def difference_in_meaning(left: Layout, right: Layout) -> str:
-    """Return where the meaning of two layouts first differs; empty if nowhere.
+    """Describe the first difference in meaning between two layouts; empty if they agree.
 
-    Ranges may differ, because a longer leg only widens them; names, order, units, shapes and gains
-    may not.
+    Names, order, units, shapes and gains are compared. Ranges are not, because a longer leg widens
+    them without changing their meaning.
     """
     for place, (a, b) in enumerate(zip(left, right, strict=False)):
         for aspect in ("name", "unit", "shape", "gain", "gain_unit"):
@@ -201,7 +199,7 @@ def difference_in_meaning(left: Layout, right: Layout) -> str:
 class Half:
     """One half of a map: a rule for each feature of a side, in vectorised form.
 
-    A number that is copied with scale 1 is bitwise equal.
+    A number that is copied with scale 1 is bitwise equal to the original.
 
     Attributes:
         side: The layouts.

@@ -1,4 +1,4 @@
-"""Learners: their settings declare what they take, and a `Learner` trains, evaluates and stores.
+"""Base classes of learners and of their settings.
 
 A learner is one file, of Shapechanger or of another package: a class of settings, which is
 registered as an entry point in the group `shapechanger.learners`, and the `Learner` that it names.
@@ -27,25 +27,25 @@ if TYPE_CHECKING:
 Takes = Literal[
     "trial", "on-policy", "off-policy", "callback", "demonstrations", "many bodies", "device"
 ]
-"""Abilities and requirements of learners: steps in an env ("trial"), each used once or kept in a
-replay buffer; callbacks of Stable-Baselines3; demonstrations; many bodies at once; worlds on a
-device."""
+"""Abilities and requirements of learners: training by steps in an env ("trial"), each step used
+once ("on-policy") or kept in a replay buffer ("off-policy"); callbacks of Stable-Baselines3;
+demonstrations; many bodies at once; worlds on a device."""
 
 
 def ignore(evaluation: Evaluation) -> None:
-    """Discard an evaluation: given as `on_evaluation`, none is needed along the way."""
+    """Discard an evaluation; as `on_evaluation`, it skips evaluations during training."""
     del evaluation
 
 
 class LearnerSettings:
     """Base class of the settings of learners, which are also structs of msgspec with a tag.
 
-    The tag is the name of the learner's kind, and `type` in files.
+    The tag is the name of the learner's kind, which files store as `type`.
 
     Attributes:
         takes: Abilities and requirements of the learner.
-        learner: Its class, as `module:class`.
-        packages: Packages that its numbers depend on, in addition to the packages of every study.
+        learner: Class of the learner, as `module:class`.
+        packages: Packages that results depend on, in addition to the packages of every study.
         steps: Default env steps of a training.
         source_steps: Default env steps of a source policy; 0 for half as many as on the target.
         eval_every: Steps between two evaluations.
@@ -100,18 +100,18 @@ class LearnerSettings:
             which: "target" or "source", if there are two budgets.
 
         Raises:
-            StudyError: If it does.
+            StudyError: If the budget is smaller than `eval_every`.
         """
         if steps < self.eval_every:
             budget = f"{steps} {which} steps" if which else f"{steps} steps"
             raise StudyError(
-                f"A budget of {budget} is smaller than one evaluation, which comes every "
-                f"{self.eval_every} steps: give at least that."
+                f"A budget of {budget} is too small, because policies are evaluated every "
+                f"{self.eval_every} steps: give at least {self.eval_every} steps."
             )
 
 
 class SharedFile(NamedTuple):
-    """File that the runs of a study share, such as demonstrations in one env."""
+    """File that several runs of a study share, such as demonstrations, and the seed of its data."""
 
     path: Path
     seed: int
@@ -125,9 +125,9 @@ class Learner(Generic[_Settings]):
 
     Attributes:
         name: Name of the learner, for the cards of its policies.
-        settings: Its settings.
-        threads: Threads that step the envs, None for one per core; the result is the same. One by
-            default: a study runs as many trainings at a time as there are cores.
+        settings: Settings of the learner.
+        threads: Number of threads that step the envs, None for one per core. It does not change
+            results. The default is 1, because a study already runs one training per core.
         tensorboard: Folder of TensorBoard's logs; None for no logs.
     """
 
@@ -144,15 +144,15 @@ class Learner(Generic[_Settings]):
         return "CPU"
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
-        """Refuse an env that it cannot learn in.
+        """Refuse an env that the learner cannot train in.
 
         Args:
             env: The env.
-            traits: Its traits.
+            traits: Properties of the env.
 
         Raises:
-            StudyError: If it lacks something.
-            SpaceMismatch: If its spaces do not fit its layouts.
+            StudyError: If the env does not fulfil a requirement of the learner.
+            SpaceMismatch: If the env's spaces do not fit its layouts.
         """
         raise NotImplementedError
 
@@ -167,7 +167,9 @@ class Learner(Generic[_Settings]):
         on_evaluation: Callable[[Evaluation], None] = ignore,
         on_steps: Callable[[int], None] = lambda steps: None,
     ) -> Any:
-        """Train a policy. A kind of learner may take more arguments, see `Takes`.
+        """Train a policy.
+
+        Subclasses may have more arguments, such as `callback` if `takes` contains "callback".
 
         Args:
             env: The env.
@@ -184,7 +186,7 @@ class Learner(Generic[_Settings]):
         raise NotImplementedError
 
     def evaluation_envs(self, env: EnvRef) -> list[gym.Env[Any, Any]]:
-        """Make the envs in which its policies are evaluated.
+        """Make the envs in which the learner's policies are evaluated.
 
         Args:
             env: The env.
@@ -209,7 +211,7 @@ class Learner(Generic[_Settings]):
         raise NotImplementedError
 
     def origin(self, path: Path) -> PolicyCard:
-        """Read the card of a stored policy, which must fit as a source.
+        """Read the card of a stored policy that this learner can use as a source.
 
         Raises:
             PolicyError: If another kind of learner trained it.

@@ -24,13 +24,13 @@ from shapechanger.errors import UnknownName
 
 EVALUATION_SEED: Final = 10_000_000
 """Seed of the first evaluation episode: far from the seeds of training."""
-# Option of an env that selects one of many bodies by its seed, and how many bodies get episodes of
-# their own before those repeat: seeds of episodes end at 2^32.
+# Option of an env that selects one of many bodies by its seed.
 _INDIVIDUAL: Final = "finger_seed"
+# Numbers of bodies and of episodes per body with distinct seeds, because seeds must be below 2^32.
 _MOST_INDIVIDUALS: Final = 100_000
 _MOST_EPISODES: Final = 10_000
 
-# Observations of shape (n, ...) in, actions of shape (n, ...) out.
+# Maps observations of shape (n, ...) to actions of shape (n, ...).
 Act = Callable[[NDArray[Any]], NDArray[Any]]
 
 
@@ -45,8 +45,8 @@ class Evaluation(msgspec.Struct, frozen=True):
         success: Share of the episodes whose last `info["is_success"]` is true; None if the env does
             not report success.
         measures: Mean of each measure of the env except the return, keyed by name.
-        standing: Share of the steps whose `info["standing"]` is true; None if the env does not
-            report it; only vehicles do.
+        standing: Share of the steps whose `info["standing"]` is true, which only vehicles report;
+            None if the env does not report it.
     """
 
     steps: int
@@ -61,7 +61,7 @@ class Evaluation(msgspec.Struct, frozen=True):
         """Return the value of a measure, or the sum of a reward term.
 
         Raises:
-            UnknownName: If the evaluation has none of this name.
+            UnknownName: If the evaluation contains no measure or term of this name.
         """
         known = {RETURN.name: self.mean_return, **self.measures, **self.terms}
         if measure not in known:
@@ -72,9 +72,9 @@ class Evaluation(msgspec.Struct, frozen=True):
 def evaluation_seed(env: EnvRef, episodes: int) -> int:
     """Return the seed of the first evaluation episode in an env.
 
-    It is the same for all policies, so arms are compared on equal episodes. Each individual body,
-    such as a finger of a gap, has its own episodes, so that a mean over bodies is also one over
-    many targets.
+    The seed is the same for all policies, so arms are compared on equal episodes. Each individual
+    body, such as one of many random fingers, has its own seeds, so that a mean over bodies is also
+    a mean over many tasks.
     """
     individual = int(env.kwargs.get(_INDIVIDUAL) or 0) % _MOST_INDIVIDUALS
     return EVALUATION_SEED + min(episodes, _MOST_EPISODES) * individual
@@ -83,7 +83,7 @@ def evaluation_seed(env: EnvRef, episodes: int) -> int:
 def evaluation_envs(
     env: EnvRef, episodes: int, limit: int | None = None
 ) -> list[gym.Env[Any, Any]]:
-    """Make the envs that evaluate a learner's policies, in held-out surroundings if any."""
+    """Make the envs that evaluate a learner's policies, with held-out surroundings if available."""
     more = {} if limit is None else {"max_episode_steps": limit}
     envs = [env.make(**more)]
     if not is_single_instance(envs[0]):
@@ -100,9 +100,9 @@ def evaluate(
     steps: int = 0,
     episodes: int | None = None,
 ) -> Evaluation:
-    """Average a policy's episodes, whose seeds count up from `seed`.
+    """Return the averages over a policy's episodes, whose seeds count up from `seed`.
 
-    The number of episodes is rounded up to a multiple of the envs; by default, one for each env.
+    `episodes` is rounded up to a multiple of the number of envs; None for one episode per env.
     """
     played: list[_Episode] = []
     for first in range(0, len(envs) if episodes is None else episodes, len(envs)):
@@ -139,7 +139,7 @@ class _Episode:
         self.total += reward
         self.length += 1
         for name, value in info.items():
-            # NumPy's float32 is not a Python float; ants report their control cost as one.
+            # Ants report their control cost as NumPy's float32, which is not a Python float.
             if is_reward_term(name) and isinstance(value, int | float | np.floating):
                 self.terms[name] = self.terms.get(name, 0.0) + float(cast("float", value))
         if "is_success" in info:
@@ -152,7 +152,7 @@ class _Episode:
                 self.measures[measure.name] = float(info[measure.key]) + before
 
     def end(self, measures: Sequence[Measure], limit: int | None) -> None:
-        """Divide sums over the episode by the time limit in steps, or by its length if None."""
+        """Divide sums by the time limit in steps, or by the episode's length without a limit."""
         for measure in measures:
             if measure.over == "episode" and measure.name in self.measures:
                 self.measures[measure.name] /= limit or self.length

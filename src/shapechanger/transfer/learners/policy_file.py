@@ -1,8 +1,8 @@
-"""Trained policies of Stable-Baselines3: their files, and conversion of its own zips.
+"""Trained policies of Stable-Baselines3: their files, and conversion of Stable-Baselines3's zips.
 
-A file has the weights, the normalisation statistics and the bounds of the model's own spaces.
-The model's actions are scaled from those bounds to the bounds of the action layout; in files of
-older versions the two are equal.
+A file contains the weights, the normalisation statistics and the bounds of the model's spaces. The
+model's actions are scaled from the bounds of its action space to the bounds of the action layout;
+in files of older versions these bounds are equal.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Act
 
 _SHIPPED: Final[dict[str, type[BaseAlgorithm]]] = {"PPO": PPO, "SAC": SAC, "TQC": TQC}
-# Packages that a file may name; importing any other could run any code.
+# Packages that a policy file may name; importing other packages could run arbitrary code.
 _FILES_MAY_IMPORT: Final = ("stable_baselines3", "sb3_contrib")
-# Arguments that are not settings.
+# Arguments of algorithms that are not settings.
 _GIVEN: Final = ("self", "policy", "env", "envs", "seed", "_init_setup_model")
 _WEIGHTS: Final = "policy."
 _STATISTICS: Final = "normalisation."
@@ -85,11 +85,11 @@ class TrainedPolicy(Policy):
     """A policy with its normalisation and card.
 
     Attributes:
-        model: Stable-Baselines3's model, whose own actions are from -1 to 1; see
-            `shapechanger.transfer.actions`. One that was loaded has the weights and settings of the
-            trained one, and a new optimiser.
-        normalisation: The statistics that it was trained with; None if it is not normalised.
-        card: Its provenance.
+        model: Model of Stable-Baselines3, whose actions are from -1 to 1; see
+            `shapechanger.transfer.actions`. A loaded model has the weights and settings of the
+            trained model, and a new optimiser.
+        normalisation: Statistics of the training; None if observations are not normalised.
+        card: Provenance of the policy.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class TrainedPolicy(Policy):
     def of_file(
         cls, card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
     ) -> TrainedPolicy:
-        """Return the policy of a file, whose settings are a table, see `load_policy`."""
+        """Build the policy of a file, whose card has the settings as a table; see `load_policy`."""
         settings = LearnerSettings.from_builtins(card.settings)
         card = msgspec.structs.replace(card, settings=settings)
         _require_numbers(card, tensors)
@@ -109,11 +109,11 @@ class TrainedPolicy(Policy):
 
     @property
     def act(self) -> Act:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The policy's mean actions for observations of shape (n, ...), in the env's units."""
+        """Function from observations of shape (n, ...) to mean actions in the env's units."""
         return actor(self.model, self.normalisation, self.card.layouts[1])
 
     def tensors(self) -> dict[str, NDArray[Any]]:
-        """Return its weights, spaces and statistics, keyed by name."""
+        """Return the policy's weights, spaces and statistics, keyed by name."""
         tensors: dict[str, NDArray[Any]] = {
             _WEIGHTS + name: value.detach().cpu().numpy()
             for name, value in self.model.policy.state_dict().items()
@@ -136,12 +136,12 @@ def actor(
     *,
     deterministic: bool = True,
 ) -> Act:
-    """Return a function from the env's observations to the env's actions, which `action` describes.
+    """Return a function from the env's observations to the env's actions, with layout `action`.
 
-    Deterministic actions are the mean ones, without exploration noise.
+    Deterministic actions are the mean actions, without exploration noise.
     """
     if deterministic and hasattr(model.policy, "act"):
-        return cast("Any", model).policy.act  # Rows of limbs are scaled already, and of any body.
+        return cast("Any", model).policy.act  # A policy of limbs, which needs no scaling.
     mean = _mean_action(model) if deterministic else None
     scale = ActionScale.between(cast("Any", model).action_space, action)
 
@@ -159,7 +159,7 @@ def actor(
 
 
 def _mean_action(model: BaseAlgorithm) -> Act | None:
-    """Return PPO's mean action, a fourth of the time of an equal `predict`; None for others."""
+    """Return a function of PPO's mean action, four times as fast as `predict`; None for others."""
     policy: Any = model.policy
     kinds: Any = (type(policy), type(policy.features_extractor), type(policy.action_space))
     if kinds != (ActorCriticPolicy, FlattenExtractor, gym.spaces.Box):
@@ -179,7 +179,7 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
 def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> None:
     """Refuse numbers that are not finite, and a network that is larger than the file.
 
-    PyTorch fills a network's memory before it compares sizes.
+    PyTorch allocates a network's memory before it compares sizes.
     """
     for name, value in tensors.items():
         is_bound = name.startswith(f"{_SPACES}observation")  # May be infinite.
@@ -189,17 +189,17 @@ def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
     widths = (card.layouts[0].size, *settings.net_arch)
     weights = sum(before * after for before, after in pairwise(widths))
     known = sum(value.size for value in tensors.values())
-    # A custom class need not take `net_arch`.
+    # A custom class may ignore `net_arch`.
     if settings.algorithm in {"PPO", "SAC", "TQC"} and weights > known:
         raise ValueError(f"its card needs at least {weights} weights, and it has {known} numbers")
-    # Worlds on a device are not built again.
+    # Loading a policy does not create worlds on a device.
     if settings.n_envs > _MOST_ENVS and "device" not in settings.takes:
         raise ValueError(f"its card has {settings.n_envs} envs, more than {_MOST_ENVS}")
 
 
 def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str) -> BaseAlgorithm:
     """Build the model that the card describes, with the weights of the file."""
-    settings: Any = card.settings.for_model()  # As in its training.
+    settings: Any = card.settings.for_model()
     if settings.algorithm != algorithm:
         require_class(settings.algorithm)
     spaces: list[gym.spaces.Box] = []
@@ -211,7 +211,7 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
             raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
         spaces.append(gym.spaces.Box(low, high, dtype=low.dtype.type))
     envs = DummyVecEnv([lambda: SpacesOnly(*spaces)] * settings.n_envs)
-    # Building a model seeds Python, NumPy and PyTorch; a training around it must not repeat itself.
+    # Building a model seeds the global generators, which a running training may be using.
     states = random.getstate(), np.random.get_state(), torch.get_rng_state()  # noqa: NPY002
     try:
         model: Any = build_model(settings, envs, card.seed)
@@ -285,7 +285,7 @@ def _is_class(algorithm: object) -> bool:
 
 
 def require_class(algorithm: str) -> None:
-    """Refuse the name of an algorithm that is not a class of models, before importing it."""
+    """Refuse an algorithm that is not a class of models, or whose module must not be imported."""
     module = algorithm.partition(":")[0]
     own = algorithm not in _SHIPPED and module not in sys.modules
     if own and module.partition(".")[0] not in _FILES_MAY_IMPORT:
@@ -302,7 +302,7 @@ def require_class(algorithm: str) -> None:
 
 
 def checked_settings(settings: ImportedSettings) -> ImportedSettings:
-    """Import an algorithm, check the names of its arguments, and fill in how often it updates."""
+    """Import an algorithm, check the names of its arguments, and set `steps_per_update`."""
     made = _load(settings.algorithm)
     if not callable(made) or (isinstance(made, type) and not _is_class(made)):
         raise StudyError(
@@ -315,7 +315,7 @@ def checked_settings(settings: ImportedSettings) -> ImportedSettings:
         if name not in known and not anything:
             raise UnknownName(f"setting of {settings.algorithm}", name, known)
     for name in ("n_steps", "train_freq"):
-        # Off-policy algorithms have both, and their `n_steps` counts the steps of a return.
+        # In off-policy algorithms, which have a `buffer_size`, `n_steps` is the length of a return.
         if name == "n_steps" and "buffer_size" in takes:
             continue
         default: Any = takes[name].default if name in takes else None
@@ -346,17 +346,17 @@ class SpacesOnly(gym.Env[Any, Any]):
 def convert_zip(
     path: Path, env: EnvRef, layouts: tuple[Layout, Layout], identity: Identities, command: str
 ) -> TrainedPolicy:
-    """Convert a zip of PPO, SAC or TQC; loading it can run code in it.
+    """Convert a zip of PPO, SAC or TQC. Loading a zip can run code that it contains.
 
     Args:
         path: A zip that the model's `save` wrote.
-        env: The env that it was trained in.
+        env: The env that the model was trained in.
         layouts: Layouts of the env's observations and actions.
-        identity: Version of the env.
-        command: The command that converts it.
+        identity: Identity of the env.
+        command: The command that converts the zip.
 
     Raises:
-        PolicyError: If the file is missing or no such zip, or of another algorithm.
+        PolicyError: If the file is missing, not a zip of a model, or of another algorithm.
         SpaceMismatch: If the layouts do not fit the policy's spaces.
     """
     model = _read_zip(path)
@@ -381,7 +381,7 @@ def convert_zip(
 def _read_zip(path: Path) -> Any:
     try:
         data: Any = load_from_zip_file(path, device="cpu")[0]
-        # A2C has PPO's policy, and no clipping.
+        # A2C has the same policy class as PPO, but no `clip_range`.
         kinds: tuple[Any, ...] = (PPO,) if "clip_range" in data else (SAC, TQC)
         for kind in kinds:
             if data["policy_class"] is kind.policy_aliases["MlpPolicy"]:
@@ -399,7 +399,7 @@ def _read_zip(path: Path) -> Any:
 
 
 def _settings_of(model: Any) -> Sb3Settings:
-    """Return the settings of a model, whose networks must be those that the settings describe."""
+    """Return the settings of a model; refuse a model whose networks they cannot describe."""
     on_policy = hasattr(model, "clip_range")
     activation = nn.Tanh if on_policy else nn.ReLU
     widths = model.policy.net_arch
@@ -419,7 +419,7 @@ def _settings_of(model: Any) -> Sb3Settings:
     else:
         kept["train_freq"], unit = model.train_freq
         if unit.value != "step":
-            raise PolicyError("This model updates after episodes: only updates after steps fit.")
+            raise PolicyError("This model updates after episodes: it must update after steps.")
         per_env = kept["train_freq"]
     update = model.n_envs * per_env
     steps = max(int(model.num_timesteps), update)

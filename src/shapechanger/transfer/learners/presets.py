@@ -27,7 +27,7 @@ def _tables() -> dict[str, dict[str, Any]]:
 
 
 class _Presets(Mapping[str, LearnerSettings]):
-    """Shipped settings, keyed by name; each is read when it is asked for."""
+    """Shipped settings, keyed by name; each preset is read when it is accessed."""
 
     def __getitem__(self, name: str) -> LearnerSettings:
         table = _tables()[name]
@@ -112,7 +112,7 @@ def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, LearnerS
         given = tomllib.loads(text)
     except FileNotFoundError:
         raise UnknownName("learner", str(path), LEARNERS) from None
-    except (OSError, ValueError) as error:  # TOMLDecodeError is one, too.
+    except (OSError, ValueError) as error:  # TOMLDecodeError is a ValueError.
         raise StudyError(f"The learner {path} cannot be read: {error}.") from error
     start = given.pop("preset", None) or given.pop("algorithm", None)
     if not isinstance(start, str) or start.endswith(".toml"):
@@ -128,7 +128,7 @@ def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, LearnerS
 
 
 def _imported(algorithm: str, changed: Mapping[str, Any]) -> ImportedSettings:
-    from shapechanger.transfer.learners.policy_file import checked_settings  # PyTorch.
+    from shapechanger.transfer.learners.policy_file import checked_settings  # Imports PyTorch.
 
     ours = {field.name for field in msgspec.structs.fields(ImportedSettings)}
     own = {name: value for name, value in changed.items() if name in ours}

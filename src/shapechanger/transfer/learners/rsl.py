@@ -1,9 +1,9 @@
 """PPO of rsl-rl on many worlds of one device, with the policies of Stable-Baselines3.
 
-Everything that learns is on the device: worlds, networks, statistics and batches. A training begins
-with the weights of a model of Stable-Baselines3's PPO with the same settings. The trained weights
-are copied back into this model, which is evaluated in the CPU env and saved. So cards, curves,
-transplants and exports are the same as for other learners.
+Worlds, networks, statistics and batches are on the device. A training begins with the weights of a
+model of Stable-Baselines3's PPO with the same settings. The trained weights are copied back into
+this model, which is evaluated in the CPU env and saved. So cards, curves, transplants and exports
+are the same as for other learners.
 """
 
 # This module uses private members of the learner of Stable-Baselines3.
@@ -40,7 +40,7 @@ except ImportError as error:
 
 # The group of observations that actor and critic read.
 GROUP: Final = "policy"
-# Values of Stable-Baselines3, which both learners use.
+# Values of Stable-Baselines3's PPO, which rsl-rl's PPO must use too.
 _VALUE_WEIGHT: Final = 0.5
 _LONGEST_GRADIENT: Final = 0.5
 _ADAMS_EPSILON: Final = 1e-5
@@ -48,27 +48,27 @@ _CLIPPED_REWARD: Final = 10.0
 
 
 class RslVecEnv(RslEnvs):
-    """Worlds of `shapechanger.make_vec(backend="warp")` as rsl-rl's learners take them.
+    """Worlds of `shapechanger.make_vec(backend="warp")` with the interface of rsl-rl's envs.
 
     Observations are in the group `policy`. A world whose episode has ended starts again in the same
-    step, and `time_outs` says where only the time limit ended it. Actions are from -1 to 1; those
-    outside are moved to the edge, as Stable-Baselines3 does.
+    step, and `time_outs` is true for worlds whose episode ended only because of the time limit.
+    Actions are clipped to the range from -1 to 1, as in Stable-Baselines3.
 
     Args:
         envs: The worlds; they are reset.
-        seed: Seed of the first world; None for seeds of the system.
-        rows: The `DeviceRows` of the worlds, for a policy of limbs, which then observes rows and
-            gives a number from -1 to 1 for each limb; None for the body's own numbers.
+        seed: Seed of the first world; None for a random seed.
+        rows: The `DeviceRows` of the worlds for a policy of limbs, which observes rows and returns
+            a number from -1 to 1 for each limb; None for the body's observations and actions.
 
     Raises:
-        StudyError: If the worlds have several spaces and no rows.
+        StudyError: If the worlds have several spaces and `rows` is None.
     """
 
     def __init__(self, envs: Any, seed: int | None = None, rows: Any = None) -> None:
         seen = envs.reset(seed=seed)[0]
         if rows is None and isinstance(seen, tuple):
             raise StudyError(
-                "rsl-rl takes worlds of one pair of spaces: make one vector env for each, or give "
+                "rsl-rl needs worlds with equal spaces: make one vector env for each body, or give "
                 "the rows of each body's limbs."
             )
         self.envs = envs
@@ -109,7 +109,7 @@ class RslVecEnv(RslEnvs):
             actions: Shape (n, num_actions).
 
         Returns:
-            Observations, rewards, ends, and `time_outs` among the extras.
+            Observations, rewards, whether each episode has ended, and extras with `time_outs`.
         """
         moved: Any = actions.clamp(-1.0, 1.0)
         if self._rows is not None:
@@ -134,7 +134,7 @@ class RslLearner(Sb3Learner):
         return "CPU" if device == "cpu" else torch.cuda.get_device_name(device)
 
     def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:
-        """Return an env for the model and its statistics; its worlds are made in `_learn`."""
+        """Return an env that only has the model's spaces; `_learn` makes the worlds."""
         del env
         spaces = SpacesOnly(one.observation_space, one.action_space)
         return DummyVecEnv([lambda: spaces])
@@ -149,7 +149,7 @@ class RslLearner(Sb3Learner):
         progress: Progress,
     ) -> None:
         if callbacks:
-            raise StudyError(f"{self.name} takes no callback of Stable-Baselines3.")
+            raise StudyError(f"{self.name} cannot use callbacks of Stable-Baselines3.")
         made, rows = self._worlds(env)
         worlds = MAKERS.load("make_vec")(
             made.id,
@@ -172,7 +172,7 @@ class RslLearner(Sb3Learner):
             training.write_back()
 
     def _worlds(self, env: EnvRef) -> tuple[EnvRef, Any]:
-        """Return the envs of all worlds as one, and the rows of each body; None without limbs."""
+        """Return one reference for all worlds, and the rows of each body or None without limbs."""
         return env, None
 
     def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> RslTraining:
@@ -181,9 +181,9 @@ class RslLearner(Sb3Learner):
 
 
 class _Returns:
-    """Discounted returns of worlds, by whose deviation rewards are divided as in `VecNormalize`.
+    """Discounted returns of worlds; rewards are divided by their deviation, as in `VecNormalize`.
 
-    Everything stays on the device, in the precision and order of `RunningMeanStd`.
+    All tensors stay on the device. Sums have the precision and order of `RunningMeanStd`.
     """
 
     def __init__(
@@ -200,7 +200,7 @@ class _Returns:
             )
 
     def scaled(self, rewards: Tensor, ends: Tensor) -> Tensor:
-        """Return the rewards of a step, (n,), over the deviation of the returns; `ends`: (n,)."""
+        """Divide the rewards of a step, (n,), by the deviation of the returns; `ends`: (n,)."""
         if self._statistics is None:
             return rewards
         self._returns = self._returns * self._gamma + rewards
@@ -262,11 +262,11 @@ class RslTraining:
         self._returns = _Returns(envs.num_envs, device, self._statistics, settings.gamma)
 
     def _networks(self, seen: TensorDict) -> tuple[Any, Any]:
-        """Return an actor and a critic of the same shapes as the model's."""
+        """Return an actor and a critic with the shapes of the model's networks."""
         groups = {"actor": [GROUP], "critic": [GROUP]}
         shape: dict[str, Any] = {
             "hidden_dims": self._settings.net_arch,
-            "activation": "tanh",  # As in Stable-Baselines3.
+            "activation": "tanh",  # The activation of Stable-Baselines3's PPO.
             "obs_normalization": self._settings.normalise,
         }
         actor = cast("Any", MLPModel)(
@@ -283,7 +283,7 @@ class RslTraining:
         return actor, cast("Any", MLPModel)(seen, groups, "critic", 1, **shape)
 
     def update(self, done: int, on_steps: Callable[[int], None]) -> None:
-        """Collect the steps of an update, and learn from them."""
+        """Collect the steps of an update, and train the networks on them."""
         with torch.inference_mode():
             for step in range(self._settings.n_steps):
                 actions = self._ppo.act(self._seen)
@@ -308,7 +308,7 @@ class RslTraining:
         return pairs
 
     def _read(self) -> None:
-        """Take weights and statistics from the model."""
+        """Copy weights and statistics from the model."""
         with torch.no_grad():
             for ours, theirs in self._pairs():
                 ours.load_state_dict(theirs.state_dict())
@@ -325,7 +325,7 @@ class RslTraining:
                     normaliser.count.fill_(int(found.count))
 
     def write_back(self) -> None:
-        """Give the model the present weights and statistics."""
+        """Copy the present weights and statistics to the model."""
         with torch.no_grad():
             for ours, theirs in self._pairs():
                 theirs.load_state_dict(cast("dict[str, Any]", ours.state_dict()))

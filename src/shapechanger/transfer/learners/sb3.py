@@ -51,8 +51,8 @@ training from a policy.
 
 A converged policy hardly explores: with the standard deviations of 0.06 to 0.22 of the shipped
 finger's policy, fine-tuning reached no target of another finger in 30,720 steps
-(`python -m benchmarks.run finger-gap`, measured before this was raised). A source that explores
-more keeps its own deviation, and no policy starts above a new policy's deviation because of this.
+(`python -m benchmarks.run finger-gap`, measured before the minimum was introduced). A larger
+deviation of the source is kept, and none is raised above the deviation of a new policy.
 """
 
 
@@ -80,11 +80,11 @@ class Sb3Learner(Learner[Sb3Settings]):
         """Train a policy, evaluating it before the first step, along the way, and at the end.
 
         `steps` are rounded up to whole updates, `on_steps` is called after each step of all envs,
-        and `callback` is one of Stable-Baselines3's for the training.
+        and `callback` is a callback of Stable-Baselines3.
         """
         self.settings.require_budget(steps)
         with ExitStack() as stack:
-            # These import the module of the id, if it names one.
+            # Making the envs imports the module that the id may name.
             eval_envs = self.evaluation_envs(env)
             for each in eval_envs:
                 stack.callback(each.close)
@@ -119,9 +119,9 @@ class Sb3Learner(Learner[Sb3Settings]):
                 on_evaluation(found)
                 return found
 
-            # A third of the time of a finger's training is evaluation.
+            # Without a callback, skip evaluations: a third of the time of training a finger.
             every = math.inf if on_evaluation is ignore else settings.eval_every
-            # Before `learn`: it starts with a reset, which already changes the running statistics.
+            # Evaluate before `learn`, whose first reset changes the running statistics.
             if on_evaluation is not ignore:
                 evaluate_now()
             callbacks: list[BaseCallback] = [] if callback is None else [callback]
@@ -166,8 +166,8 @@ class Sb3Learner(Learner[Sb3Settings]):
         policy = load_policy(path, self.settings.algorithm)
         if not isinstance(policy, TrainedPolicy):
             raise PolicyError(
-                f"{path} is a clone or a policy as ONNX, and {self.name} cannot train those: give "
-                f"a policy trained with {self.name}, or --learner cloning for a clone."
+                f"{path} is a clone or an ONNX policy, which {self.name} cannot train: give a "
+                f"policy trained with {self.name}, or --learner cloning for a clone."
             )
         return policy
 
@@ -183,7 +183,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         return card
 
     def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:
-        """Make the parallel envs of a training; `one` is an env that evaluates."""
+        """Make the parallel envs of a training; `one` is one of the evaluation envs."""
         del one
         return training_vec_env(env, self.settings.n_envs, self.threads)
 
@@ -202,7 +202,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         if start is None or body_map is None:
             return self._new_model(envs, card), None
         if start.normalisation is not None and isinstance(envs, VecNormalize):
-            # The critic predicts rewards divided by these.
+            # The source's critic predicts returns that are normalised by these statistics.
             envs.ret_rms = start.normalisation.reward.copy()
         model = self._moved(start, envs, card, body_map)
         return model, _explore(model, card.settings)
@@ -217,7 +217,7 @@ class Sb3Learner(Learner[Sb3Settings]):
     def _moved(
         self, source: TrainedPolicy, envs: VecEnv, card: PolicyCard, body_map: BodyMap
     ) -> BaseAlgorithm:
-        """The source policy in the target's shapes, with its statistics, ready for training."""
+        """Transplant the source policy into the target's shapes, with its statistics."""
         arguments, statistics = card.settings.for_model().model_arguments, source.normalisation
         return transplant(
             source.model,
@@ -240,7 +240,7 @@ class Sb3Learner(Learner[Sb3Settings]):
 
 
 def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] | None:
-    """Raise collapsed deviations, and return their logarithms; None if they are no parameter."""
+    """Raise small deviations; return their logarithms, or None if the policy has no `log_std`."""
     if not isinstance(model.policy, ActorCriticPolicy):
         return None
     log_std: torch.Tensor = model.policy.log_std
@@ -250,7 +250,7 @@ def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] |
 
 
 def statistics_of(envs: VecEnv) -> Normalisation | None:
-    """Return the statistics that envs keep; None if they keep none."""
+    """Return the normalisation statistics of envs; None if they do not normalise."""
     if not isinstance(envs, VecNormalize):
         return None
     observation = (
@@ -260,7 +260,7 @@ def statistics_of(envs: VecEnv) -> Normalisation | None:
 
 
 class _ActFirst(BaseCallback):
-    """Lets a transplanted policy act itself before the first update, where a new one is random."""
+    """Lets a transplanted policy act before the first update, when a new policy acts randomly."""
 
     def __init__(self, learning_starts: int) -> None:
         super().__init__()
@@ -287,7 +287,7 @@ class Progress(BaseCallback):
         evaluate_now: Evaluates and reports the present policy.
         every: Steps between two evaluations.
         on_steps: Called with the number of steps done.
-        restarts: Whether an evaluation uses the training env, which then starts again.
+        restarts: Whether evaluations use the training env, which must then be reset after each.
     """
 
     evaluate_now: Callable[[], Evaluation]

@@ -33,11 +33,11 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
     last_k = 3
     episode_limit = None
     policy_class: ClassVar[str] = "MlpPolicy"
-    """The class of its policies: a name of Stable-Baselines3's, or `module:class`."""
+    """Class of the policies: a name that Stable-Baselines3 defines, or `module:class`."""
 
-    # Name of the setting that is the steps of each env between two updates.
+    # Name of the setting for the number of steps of each env between two updates.
     _steps_per_update: ClassVar[str]
-    # Settings that are neither shared nor arguments of the class.
+    # Settings of a subclass that are not arguments of the algorithm's class.
     _ours: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
@@ -45,18 +45,18 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
             raise StudyError("A learner needs at least one env, one step and one episode.")
         if self.eval_every < self.update_steps:
             raise StudyError(
-                f"An evaluation every {self.eval_every} steps is more often than an update, "
-                f"which takes {self.update_steps}."
+                f"eval_every must be at least {self.update_steps}, the steps of one update, got "
+                f"{self.eval_every}."
             )
 
     @property
     def update_steps(self) -> int:
-        """Env steps between two updates; budgets are rounded up to a multiple of it."""
+        """Env steps between two updates; budgets are rounded up to a multiple of this number."""
         return self.n_envs * getattr(self, self._steps_per_update)
 
     @property
     def model_arguments(self) -> dict[str, Any]:
-        """Arguments of the class except policy, env and seed."""
+        """Arguments of the algorithm's class except policy, env and seed."""
         left_out = {*Sb3Settings.__struct_fields__, *self._ours}
         own = {n: getattr(self, n) for n in self.__struct_fields__ if n not in left_out}
         return {"policy_kwargs": self._policy_arguments(), **own}
@@ -69,16 +69,16 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
         return -(-steps // self.update_steps) * self.update_steps
 
     def for_one_env(self) -> Self:
-        """Return settings with as many steps per update in a single env."""
+        """Return settings for a single env, with the same number of steps per update."""
         changed: dict[str, Any] = {"n_envs": 1, self._steps_per_update: self.update_steps}
         return msgspec.structs.replace(self, **changed)
 
     def for_model(self) -> Self:
-        """Return the settings of its model: of one env if worlds on a device are stepped."""
+        """Return the settings of the model, which has a single env if worlds are on a device."""
         return self.for_one_env() if "device" in self.takes else self
 
     def for_budget(self, steps: int) -> Self:
-        """Return the settings for a shorter budget: four evaluations, no source default."""
+        """Return settings for a shorter budget: four evaluations, half as many source steps."""
         every = min(self.eval_every, self.whole_updates(steps // 4))
         return msgspec.structs.replace(self, eval_every=every, source_steps=0)
 
@@ -94,7 +94,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PpoSettings(Sb3Settings, frozen=True, kw_only=True, tag="ppo"):
-    """Settings of Stable-Baselines3's PPO, under its names.
+    """Settings of Stable-Baselines3's PPO, with its names.
 
     Attributes:
         n_steps: Steps of each env between two updates.
@@ -127,8 +127,8 @@ class PpoSettings(Sb3Settings, frozen=True, kw_only=True, tag="ppo"):
         return {
             "net_arch": list(self.net_arch),
             "log_std_init": self.log_std_init,
-            # Stable-Baselines3's own epsilon for PPO; `foreach` makes fewer calls from Python, for
-            # equal numbers.
+            # The epsilon is Stable-Baselines3's default for PPO. `foreach` makes fewer calls from
+            # Python, with equal results.
             "optimizer_kwargs": {"eps": 1e-5, "foreach": True},
         }
 
@@ -137,9 +137,9 @@ class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
     """Settings of PPO with a policy that sees a body as a trunk and limbs.
 
     Attributes:
-        network: "limbs" for one that fits any number of limbs; "padded" for a plain one of
-            `net_arch` on `room` limbs, with zeros where a body has fewer.
-        room: Limbs that there are rows for; 0 for as many as the bodies have.
+        network: "limbs" for a network that fits any number of limbs; "padded" for a plain network
+            of `net_arch` on `room` limbs, with zeros for missing limbs.
+        room: Number of limbs that have rows; 0 for as many as the bodies have.
     """
 
     network: Literal["limbs", "padded"] = "limbs"
@@ -153,7 +153,7 @@ class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.network == "padded" and self.room < 1:
-            raise StudyError("A padded network needs room for at least one limb, as --set room=12.")
+            raise StudyError("A padded network needs room for limbs, such as --set room=12.")
 
     def _policy_arguments(self) -> dict[str, Any]:
         policy = super()._policy_arguments()
@@ -161,7 +161,7 @@ class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
 
 
 class RslPpoSettings(PpoSettings, frozen=True, kw_only=True, tag="rsl-ppo"):
-    """Settings of rsl-rl's PPO on worlds of one device, under Stable-Baselines3's names.
+    """Settings of rsl-rl's PPO on worlds of one device, with Stable-Baselines3's names.
 
     Attributes:
         device: Name of the device, such as `cuda:0` or `cpu`; empty for the first GPU, or the CPU
@@ -180,7 +180,7 @@ class RslLimbSettings(LimbSettings, frozen=True, kw_only=True, tag="rsl-limbs"):
     """Settings of rsl-rl's PPO with a policy of limbs, on worlds of one device.
 
     Attributes:
-        device: As in `RslPpoSettings`.
+        device: Name of the device, see `RslPpoSettings`.
     """
 
     device: str = ""
@@ -192,20 +192,20 @@ class RslLimbSettings(LimbSettings, frozen=True, kw_only=True, tag="rsl-limbs"):
 
 
 class OffPolicySettings(Sb3Settings, frozen=True, kw_only=True, tag="off-policy"):
-    """Settings of SAC of Stable-Baselines3, or TQC of sb3-contrib, under their names.
+    """Settings of SAC of Stable-Baselines3, or TQC of sb3-contrib, with their names.
 
     Attributes:
         algorithm: SAC or TQC.
-        net_arch: Widths of the hidden layers, of actor and critics each.
+        net_arch: Widths of the hidden layers of the actor, and of each critic.
         learning_rate: Learning rate of Adam.
         batch_size: Transitions in a batch.
         buffer_size: Transitions that the replay buffer keeps.
-        learning_starts: Env steps before the first update, with random actions. A transplanted
-            policy acts itself in these.
+        learning_starts: Env steps before the first update, with random actions or, in transfer,
+            with the transplanted policy's actions.
         train_freq: Steps of each env between two updates.
         gradient_steps: Gradient steps of an update; -1 for as many as env steps.
         gamma: Discount.
-        tau: Share of the critics that moves into their targets at each gradient step.
+        tau: Coefficient of the soft update of the target critics at each gradient step.
         ent_coef: Weight of the entropy; "auto" to learn it.
     """
 
@@ -237,7 +237,7 @@ class ImportedSettings(Sb3Settings, frozen=True, kw_only=True, tag="imported"):
             model.
         steps_per_update: Steps of each env between two updates, which the class calls `n_steps` or
             `train_freq`.
-        arguments: Its arguments.
+        arguments: Arguments of the class or function.
     """
 
     algorithm: str
@@ -254,7 +254,7 @@ class ImportedSettings(Sb3Settings, frozen=True, kw_only=True, tag="imported"):
         return self.arguments
 
     def for_one_env(self) -> Self:
-        """Refuse more than one env: the argument that sets the steps of an update is not known."""
+        """Return the settings if there is one env; the steps of an update cannot be changed."""
         if self.n_envs > 1:
             raise StudyError(
                 f"Only one instance of this env can exist: set n_envs=1, not {self.n_envs}."

@@ -21,16 +21,16 @@ except ImportError as error:
 
 
 class ThreadVecEnv(DummyVecEnv):
-    """Envs of one id, stepped by threads, bitwise equal to `DummyVecEnv`.
+    """Envs of one id, stepped by threads, with results bitwise equal to `DummyVecEnv`.
 
-    As in `DummyVecEnv`, an env that has ended is reset in the same step; its info then holds the
-    last observation as `terminal_observation`, `TimeLimit.truncated` in every info tells whether
-    only the time limit ended the episode, and rewards are float32.
+    As in `DummyVecEnv`, an env whose episode has ended is reset in the same step. Its info then
+    contains the last observation as `terminal_observation`. `TimeLimit.truncated` in every info is
+    true if only the time limit ended the episode. Rewards are float32.
 
     Args:
         env_id: A registered id.
         num_envs: Number of envs.
-        threads: As in `shapechanger.make_vec`.
+        threads: Number of threads, see `shapechanger.make_vec`.
         **arguments: All other arguments of `shapechanger.make_vec`.
     """
 
@@ -50,7 +50,7 @@ class ThreadVecEnv(DummyVecEnv):
         cast("Any", VecEnv).__init__(
             self, num_envs, self._envs.single_observation_space, self._envs.single_action_space
         )
-        # Like DummyVecEnv, which replaces the result of the base class.
+        # DummyVecEnv, too, replaces the metadata that the constructor of VecEnv sets.
         self.metadata = self.envs[0].metadata
 
     def reset(self) -> NDArray[Any]:
@@ -82,7 +82,7 @@ class ThreadVecEnv(DummyVecEnv):
 
 
 class ScaledActions(VecEnvWrapper):
-    """Envs that take actions from -1 to 1, for any units of their actuators."""
+    """Wrapper that scales actions from -1 to 1 to the units of the envs' actuators."""
 
     def __init__(self, envs: VecEnv, scale: ActionScale) -> None:
         space = learners_space(cast("Any", envs).action_space)
@@ -107,7 +107,7 @@ class ScaledActions(VecEnvWrapper):
 
 
 def with_scaled_actions(envs: VecEnv, layout: Layout, name: str) -> VecEnv:
-    """Return envs that take actions from -1 to 1; the envs themselves if they already do."""
+    """Return envs with actions from -1 to 1; the given envs if their actions already are."""
     space = cast("Any", envs).action_space
     require_ranges(name, space, layout)
     scale = ActionScale.between(learners_space(space), layout)
@@ -117,8 +117,8 @@ def with_scaled_actions(envs: VecEnv, layout: Layout, name: str) -> VecEnv:
 def training_vec_env(env: EnvRef, num_envs: int, threads: int | None) -> VecEnv:
     """Make the parallel envs of a training, with actions in the units of their actuators.
 
-    Envs of the catalogue are stepped by threads. Envs of other packages may share state, so they
-    are stepped one after another; the numbers would be the same.
+    Shapechanger's envs are stepped by threads. Envs of other packages may share state, so they are
+    stepped one after another.
     """
     spec = gym.registry.get(env.id.rpartition(":")[2])
     if spec is not None and str(spec.vector_entry_point).startswith("shapechanger."):

@@ -24,16 +24,16 @@ from shapechanger.transfer.limbs.rows import LimbRows
 
 
 class DeviceRows:
-    """Map between the numbers of worlds of `shapechanger.make_vec(backend="warp")` and rows.
+    """Map between observations and actions of `shapechanger.make_vec(backend="warp")` and rows.
 
-    Where a body has fewer limbs than others its last rows are empty, so that all worlds share one
-    tensor.
+    If a body has fewer limbs than others, its last rows are empty, so that one tensor has the rows
+    of all worlds.
     """
 
     def __init__(self, envs: Any, each: Sequence[LimbRows]) -> None:
         self.room = each[0].room
         self._apart = isinstance(envs.single_action_space, gym.spaces.Tuple)
-        # Each batch has arrays of the same shapes, and numbers in one order.
+        # Worlds of a batch have arrays of the same shapes, with features in the same order.
         self._batches: list[tuple[Tensor, LimbRows]] = []
         for batch in envs.batches:
             rows = LimbRows.stacked([each[int(i)] for i in batch.numbers.tolist()])
@@ -48,7 +48,7 @@ class DeviceRows:
         return self._gathered(parts)
 
     def actions(self, limbs: Tensor) -> Tensor | list[Tensor]:
-        """Return the actions of all worlds as the vector env takes them.
+        """Return the actions of all worlds for the `step` of the vector env.
 
         Args:
             limbs: A number from -1 to 1 for each limb, shape (n, room).
@@ -75,7 +75,7 @@ def _on_device(rows: LimbRows, device: Any) -> LimbRows:
 
 
 class LimbModel(MLPModel):
-    """A network of a policy of limbs as rsl-rl's actor or critic."""
+    """Adapter that makes a network of `LimbPolicy` an actor or critic of rsl-rl."""
 
     def __init__(self, policy: LimbPolicy, net: nn.Module, *, acts: bool) -> None:
         # Skips the constructor of MLPModel, which would build its own network.
@@ -83,7 +83,7 @@ class LimbModel(MLPModel):
         self.obs_groups, self.obs_normalization = [GROUP], False
         self.obs_normalizer = nn.Identity()
         self.mlp: Any = copy.deepcopy(net)
-        # One deviation for any number of limbs.
+        # All limbs share one deviation, whatever their number.
         self.distribution: Any = GaussianDistribution(1, std_type="log") if acts else None
         self._as_rows = policy.rows
 
@@ -103,7 +103,7 @@ class LimbModel(MLPModel):
         return LimbPolicy.over_motors(self.distribution._distribution.entropy(), self._rows)
 
     def get_output_log_prob(self, outputs: Tensor) -> Tensor:
-        """Return logarithms of the probabilities of actions, (n, limbs); shape (n,)."""
+        """Return log-probabilities, shape (n,), of actions of shape (n, limbs)."""
         return LimbPolicy.over_motors(self.distribution._distribution.log_prob(outputs), self._rows)
 
 

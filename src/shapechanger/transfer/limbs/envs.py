@@ -1,6 +1,6 @@
 """Envs whose observations are rows, one for the trunk and one per limb, and their learner.
 
-See `shapechanger.transfer.limbs.rows` for the rows.
+A row is described in `shapechanger.transfer.limbs.rows`.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
     """An env whose observations are rows of numbers, and whose actions are one number per limb.
 
     Args:
-        env: An env that describes its kinematic tree.
-        room: Limbs to have rows for; 0 for as many as the body has.
+        env: An env with a property `tree`, its kinematic tree.
+        room: Number of limbs that have rows; 0 for as many as the body has.
 
     Attributes:
-        rows: Map from the env's observations to rows, and from limbs' actions to the env's.
+        rows: Map from the env's observations to rows, and from limbs' actions to the env's actions.
         observation_layout: Meaning of each number of the rows.
         action_layout: Meaning of each action, from -1 to 1.
 
     Raises:
-        StudyError: If the body has more limbs than room, or the env does not describe its tree.
+        StudyError: If the body has more limbs than `room`, or the env has no tree.
         LayoutError: If an observation or an action belongs to no part of the body.
     """
 
@@ -87,9 +87,9 @@ def limb_spaces(rows: LimbRows) -> tuple[gym.spaces.Box, gym.spaces.Box]:
 
 
 def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]:
-    """Return `count` envs with rows, which take the bodies in turn and have the same spaces."""
+    """Return `count` envs with rows, which cycle through the bodies and have the same spaces."""
     bodies = each_body(env)
-    # Room for all bodies, even if there are fewer envs.
+    # The largest body determines the room, even if no env has it.
     room = rows_of_each(bodies, room)[0].room
     return [LimbEnv(bodies[i % len(bodies)].make(), room) for i in range(count)]
 
@@ -108,14 +108,14 @@ class LimbVecEnv(DummyVecEnv):
     Envs whose spaces agree are stepped together.
 
     Args:
-        env: The env; its argument `bodies` says which bodies, see `each_body`. The envs have them
-            in turn.
+        env: The env; its argument `bodies` lists the bodies, see `each_body`. The envs cycle
+            through them.
         num_envs: Number of envs, at least one of each body.
-        threads: As in `shapechanger.make_vec`.
-        room: Limbs to have rows for; 0 for as many as the bodies have.
+        threads: Number of threads, see `shapechanger.make_vec`.
+        room: Number of limbs that have rows; 0 for as many as the bodies have.
 
     Raises:
-        StudyError: If there are more bodies than envs, or a body has more limbs than room.
+        StudyError: If there are more bodies than envs, or a body has more limbs than `room`.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class LimbVecEnv(DummyVecEnv):
         groups: dict[tuple[tuple[str, ...], ...], list[int]] = {}
         for i, rows in enumerate(own):
             groups.setdefault(rows.names, []).append(i)
-        # The numbers of the envs of each group, their rows, and the envs.
+        # For each group: the indices of its envs, their rows, and the envs as a vector env.
         self._groups: list[tuple[list[int], LimbRows, Any]] = []
         self._own, self.envs = own, cast("list[Any]", [None] * num_envs)
         for numbers in groups.values():
@@ -152,7 +152,7 @@ class LimbVecEnv(DummyVecEnv):
         return seen
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions for `step_wait`; shape (envs, room)."""
+        """Store actions of shape (envs, room) for `step_wait`."""
         self._actions = actions
 
     def step_wait(
@@ -181,7 +181,7 @@ class LimbVecEnv(DummyVecEnv):
 def bodies_in_turn(
     env: EnvRef, num_envs: int, room: int = 0
 ) -> tuple[list[EnvRef], list[LimbRows]]:
-    """Return the body and the rows of each of many envs, which cycle through one env's bodies."""
+    """Return the body and the rows of each env, if `num_envs` envs cycle through the bodies."""
     bodies = each_body(env)
     if len(bodies) > num_envs:
         raise StudyError(
@@ -194,7 +194,7 @@ def bodies_in_turn(
 
 
 def together(bodies: Sequence[EnvRef]) -> EnvRef:
-    """Combine envs that differ in their body into one, with the argument `bodies`."""
+    """Combine references that differ in their body into one with the argument `bodies`."""
     first = bodies[0]
     kwargs = {name: value for name, value in first.kwargs.items() if name != "body"}
     if "body" in first.kwargs:
@@ -210,7 +210,7 @@ def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:
         room = room or max(len(tree.limbs) if tree else 0 for tree in trees)
         own = [rows_of(one, room) for one in made]
     if others := [rows.columns for rows in own if rows.columns != own[0].columns]:
-        raise StudyError(f"These bodies sense different things: {own[0].columns} and {others[0]}.")
+        raise StudyError(f"These bodies have different columns: {own[0].columns} and {others[0]}.")
     return own
 
 
@@ -219,16 +219,16 @@ class LimbLearner(Sb3Learner):
 
     settings: Any
 
-    # Rows of limbs are scaled already.
+    # Observations as rows are already scaled.
     _normalises_observations = False
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
-        """Refuse an env whose spaces are not flat boxes, and bodies of different families."""
+        """Refuse an env whose spaces are not flat boxes, or whose bodies have different columns."""
         super().require(env, traits)
         rows_of_each(each_body(env), self.settings.room)
 
     def evaluation_envs(self, env: EnvRef) -> list[gym.Env[Any, Any]]:
-        """Make envs with rows, which take the bodies in turn."""
+        """Make envs with rows, which cycle through the bodies."""
         return limb_envs(env, self.settings.eval_episodes, self.settings.room)
 
     def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:

@@ -2,9 +2,9 @@
 
 The network follows URMA (N. Bohlinger and others, One Policy to Run Them All, CoRL 2024), without
 its learned temperature and layer normalisation, and with one standard deviation for all actions.
-Each limb is encoded by the same network; weights that follow from its description alone add the
-codes up, whatever their number; and the same network decodes the action of each limb from the sum,
-its code and its description.
+One network encodes each limb. The codes of all limbs are summed with weights that depend only on
+the limbs' descriptions. Another network decodes the action of each limb from the sum, its code and
+its description.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def _layers(*widths: int) -> nn.Sequential:
 
 
 class LimbNetwork(nn.Module):
-    """Network that maps the rows of a body to a number per limb, or to a single number."""
+    """Network that maps the rows of a body to a number per limb, or to one number per body."""
 
     def __init__(self, width: int, *, per_limb: bool) -> None:
         super().__init__()
@@ -50,15 +50,15 @@ class LimbNetwork(nn.Module):
             self.decode = nn.Linear(_HIDDEN, 1)
 
     def forward(self, rows: Tensor) -> Tensor:
-        """Return shape (n, limbs), or (n,).
+        """Return shape (n, limbs) if `per_limb`, else (n,).
 
         Args:
-            rows: Shape (n, 1 + limbs, width), the trunk's first.
+            rows: Shape (n, 1 + limbs, width), the trunk's row first.
         """
         limbs = rows[:, 1:]
         description = limbs[..., :DESCRIBED]
         code = self.encode(limbs)
-        # Rows without a limb have the weight 0.
+        # Rows without a limb get the weight 0 from the softmax.
         weight = self.weigh(description) + (limbs[..., :1] - 1.0) * 1e4
         summed = (torch.softmax(weight, dim=1) * code).sum(dim=1)
         core = self.core(torch.cat([self.trunk(rows[:, 0]), summed], dim=1))
@@ -69,7 +69,7 @@ class LimbNetwork(nn.Module):
 
 
 class PaddedNetwork(nn.Module):
-    """A plain network on all rows, flattened, with zeros where a body has no limb."""
+    """A multilayer perceptron on all rows, flattened; rows without a limb are zero."""
 
     def __init__(self, rows: int, width: int, *, per_limb: bool, hidden: Sequence[int]) -> None:
         super().__init__()
@@ -77,17 +77,17 @@ class PaddedNetwork(nn.Module):
         self.layers = _layers(rows * width, *hidden, rows - 1 if per_limb else 1)
 
     def forward(self, rows: Tensor) -> Tensor:
-        """Return shape (n, limbs), or (n,).
+        """Return shape (n, limbs) if `per_limb`, else (n,).
 
         Args:
-            rows: Shape (n, 1 + limbs, width), the trunk's first.
+            rows: Shape (n, 1 + limbs, width), the trunk's row first.
         """
         out = self.layers(rows.flatten(1))
         return out if self.per_limb else out.squeeze(-1)
 
 
 class LimbPolicy(ActorCriticPolicy):
-    """Actor and critic on rows; the probability of an action leaves out limbs without a motor."""
+    """Actor and critic on rows; the probability of an action ignores limbs without a motor."""
 
     def __init__(
         self,
@@ -150,11 +150,11 @@ class LimbPolicy(ActorCriticPolicy):
 
     @staticmethod
     def over_motors(numbers: Tensor, rows: Tensor) -> Tensor:
-        """Add up a number of each limb, shape (n, limbs), over those that have a motor."""
+        """Sum numbers, shape (n, limbs), over the limbs that have a motor."""
         return (numbers * rows[:, 1:, 1]).sum(dim=1)
 
     def forward(self, obs: Tensor, deterministic: bool = False) -> tuple[Tensor, Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return actions, values and logarithms of the actions' probabilities."""
+        """Return actions, values and log-probabilities of the actions."""
         rows = self.rows(obs)
         normal = self._normal(rows)
         actions = normal.mean if deterministic else normal.sample()
@@ -162,7 +162,7 @@ class LimbPolicy(ActorCriticPolicy):
         return actions, values, self.over_motors(normal.log_prob(actions), rows)
 
     def evaluate_actions(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return values, logarithms of the probabilities of actions, and the entropy."""
+        """Return values, log-probabilities of the actions, and the entropy."""
         rows = self.rows(obs)
         normal = self._normal(rows)
         entropy = self.over_motors(normal.entropy(), rows)

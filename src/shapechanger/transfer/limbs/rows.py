@@ -1,7 +1,7 @@
 """Convert observations and actions of any body to rows: one for the trunk, one for each limb.
 
-A row holds observations of its part and the numbers that describe it, in columns that are equal for
-all bodies of a family. So one network fits every body of the family.
+A row is a vector with the observations of a trunk or a limb and numbers that describe it, such as
+lengths. Its columns are the same for all bodies of a family, so one network fits all of them.
 """
 
 from __future__ import annotations
@@ -26,13 +26,20 @@ NUMBERS: Final = 22
 DESCRIBED: Final = 2 + NUMBERS
 """Columns of a row before the observations: whether the limb exists, whether it has a motor, and
 `NUMBERS`."""
-# Brings each number of a row to about 1: runners turn their joints at about 10 rad/s and move at 3
-# m/s. Contact forces are clipped to 1 by the envs.
+# Factors that scale observations to about 1, keyed by unit: joints of runners turn at about
+# 10 rad/s, and runners move at 3 m/s. The envs clip contact forces to 1.
 _SCALES: Final = {"rad/s": 0.1, "m/s": 0.3}
 
 
 class Columns(msgspec.Struct, frozen=True):
-    """The columns of a row, the same for all bodies of a family."""
+    """The columns of a row, the same for all bodies of a family.
+
+    Attributes:
+        trunk: Names of the trunk's observations.
+        limb: Names of a limb's observations.
+        trunk_numbers: Names of the numbers that describe a trunk.
+        limb_numbers: Names of the numbers that describe a limb.
+    """
 
     trunk: tuple[str, ...]
     limb: tuple[str, ...]
@@ -41,7 +48,7 @@ class Columns(msgspec.Struct, frozen=True):
 
     @property
     def width(self) -> int:
-        """Numbers of a row; the shorter kind of row, of trunk or limbs, is padded with zeros."""
+        """Length of a row; the shorter one of trunk and limb rows is padded with zeros."""
         return DESCRIBED + max(len(self.trunk), len(self.limb))
 
     def names(self, *, trunk: bool) -> list[str]:
@@ -54,7 +61,7 @@ class Columns(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class LimbRows:
-    """Map between the observations and actions of a body and its rows.
+    """Map from the observations of a body to rows, and from limbs' actions to the body's actions.
 
     Rows are `(observations * scale + offset) @ selection + constant`, flattened.
 
@@ -88,7 +95,7 @@ class LimbRows:
         return _single((observation * self.scale + self.offset) @ self.selection + self.constant)
 
     def actions(self, limbs: Any) -> Any:
-        """Return a body's own actions.
+        """Return a body's actions, in its units.
 
         Args:
             limbs: A number from -1 to 1 for each limb, shape (..., room).
@@ -109,7 +116,7 @@ class LimbRows:
 
     @property
     def room(self) -> int:
-        """Number of limbs with rows."""
+        """Number of rows for limbs, including empty rows."""
         return len(self.constant) // self.columns.width - 1
 
     def layouts(self) -> tuple[Layout, Layout]:
@@ -138,8 +145,8 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     tree: Any = getattr(inner, "tree", None)
     if tree is None:
         raise StudyError(
-            f"{name} has no kinematic tree, which a policy for many bodies reads: it needs a "
-            "property `tree`, as the MuJoCo bodies have."
+            f"{name} has no kinematic tree, which a policy for many bodies needs: give the env a "
+            "property `tree`, such as the MuJoCo bodies have."
         )
     observation, action = layouts_of(env)
     if room and len(tree.limbs) > room:
@@ -191,7 +198,7 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
 
 
 def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
-    """Refuse a body with rows of another meaning than the rows that a policy has learned from."""
+    """Refuse a body whose rows have other columns than the rows that a policy was trained on."""
 
     def meanings(layout: Layout) -> tuple[str, ...]:
         rows: dict[str, list[str]] = {}
@@ -205,7 +212,7 @@ def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
     if learned != own:
         strange = [name for name in own if name not in learned] or list(own)
         raise TransplantError(
-            f"The policy has learned in bodies of another family than {env}: it has no "
+            f"The policy was trained on bodies of another family than {env}: it has no column "
             f"{strange[0]!r} among {', '.join(learned[:3])} and {len(learned) - 3} more."
         )
 
@@ -213,9 +220,9 @@ def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
 def _column(
     feature: Feature, limb_of: dict[str, int], limb_of_body: dict[str, int], trunk: tuple[str, ...]
 ) -> tuple[int, str]:
-    """Return the row of a feature, and the name of its column.
+    """Return the index of a feature's row, and the name of its column.
 
-    Measurements of the parts of one limb, such as contact, are added up.
+    Measurements of several bodies of one limb, such as contact, share a column and are summed.
     """
     element = feature.element
     if element is None or element.kind == "task":
@@ -229,7 +236,7 @@ def _column(
         return limb_of_body[element.name] + 1, quantity
     if element.kind == "body" and element.name in trunk:
         return 0, f"trunk/{quantity}"
-    raise LayoutError(f"{feature.name} belongs to no limb of the body, and not to its trunk.")
+    raise LayoutError(f"{feature.name} must belong to a limb or the trunk of the body.")
 
 
 def _scaling(feature: Feature) -> tuple[float, float]:
