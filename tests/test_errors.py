@@ -92,7 +92,9 @@ def test_whole_numbers_are_seeds(seed: int, kind: type[int]) -> None:
 )
 def test_nothing_else_is_a_seed(seed: object) -> None:
     """All else is refused in a sentence with the range and what was given."""
-    with pytest.raises(StudyError, match=r"A seed is a whole number from 0 to 4294967295, got ."):
+    with pytest.raises(
+        StudyError, match=r"A seed must be a whole number from 0 to 4294967295, got ."
+    ):
         check_seed(seed, StudyError)
 
 

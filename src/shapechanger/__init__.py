@@ -10,17 +10,17 @@ Importing this package registers its ids with Gymnasium and loads neither a simu
 
 The names below are the public interface; each is imported on first use and may need an extra.
 
-- Layouts: `Layout`, `Feature`, `Element` name the numbers that a robot senses and moves.
+- Layouts: `Layout`, `Feature`, `Element` name the numbers of observations and actions.
 - Body edits: `Stretch`, `Radius`, `Cut`, `Remove`, `Split`, `AddSegment`, `AddLimb`, `Mass`,
   `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity`,
   `StartHeight`, `PlaceBody`, `PlaceGeom`, `TotalMass`, `AddMotor`, `AddFreeJoint` and `AddFloor`
-  are values; `reshape` and `compile_body` apply them, `interpolate` goes from one body to another,
-  `certify` proves what a shift changes. Subclass `morphology.Edit` for your own.
-- Envs: `from_mjcf` makes one of your own robot and task, `make_vec` many at once; `examine`
-  runs the exam that every env passes.
-- Transfer: `BodyMap` maps one body's numbers to another's, `transplant` moves a policy's weights,
-  `TransferTask`, `make_plan` and `run_study` measure what a transfer is worth, `load_policy` and
-  `save_policy` store policies.
+  are values; `reshape` and `compile_body` apply them, `interpolate` returns a body between two
+  bodies, `certify` lists what a shift changes. Subclass `morphology.Edit` for custom edits.
+- Envs: `from_mjcf` makes an env of a custom robot and task, `make_vec` makes vector envs, and
+  `examine` runs the checks that every env must pass.
+- Transfer: `BodyMap` maps observations and actions between bodies, `transplant` moves a policy's
+  weights, `TransferTask`, `make_plan` and `run_study` measure the effect of transfer, `load_policy`
+  and `save_policy` read and write policies.
 - Robots and demonstrations: `RobotClient`, `load_dataset`, `load_log`.
 """
 
@@ -102,7 +102,7 @@ _NAMES: Final = {
     "transfer.transplant": "transplant",
 }
 _MODULES: Final = {name: module for module, names in _NAMES.items() for name in names.split()}
-# The imports above tell type checkers the same.
+# For type checkers, the imports above define these names.
 __all__ = [*_MODULES, "Element", "Feature", "Layout", "ShapechangerError", "__version__"]  # pyright: ignore[reportUnsupportedDunderAll]
 
 register_all()

@@ -1,4 +1,4 @@
-"""`python -m shapechanger`: the command `shapechanger`, for programs that start it."""
+"""`python -m shapechanger` runs the command `shapechanger`."""
 
 from __future__ import annotations
 

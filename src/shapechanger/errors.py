@@ -1,6 +1,6 @@
-"""Exceptions. Each message is one sentence with the names that exist, or the way out.
+"""Exceptions, whose messages state the valid names or what to do.
 
-Each class also inherits from the builtin error that it is a kind of.
+Each class also inherits from the corresponding builtin exception.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ LARGEST_SEED: Final = 2**32 - 1
 """The largest seed that NumPy's, PyTorch's and Stable-Baselines3's generators all accept."""
 
 LARGEST_RESET_SEED: Final = 2**63 - 1
-"""The largest seed of an env among many, whose seeds may be a tensor of 64-bit integers."""
+"""The largest seed of a vector env, whose seeds may be a tensor of 64-bit integers."""
 
 
 class ShapechangerError(Exception):
@@ -33,18 +33,18 @@ class UnknownName(ShapechangerError, ValueError):
         kind: Kind of name, such as "body" or "environment id".
         name: The name as given.
         known: The names that exist.
-        instead: What to do without such a name, as a sentence; may be empty.
+        instead: A sentence with advice, which ends the message; may be empty.
     """
 
     def __init__(self, kind: str, name: str, known: Iterable[str], instead: str = "") -> None:
         self.kind, self.name, self.known, self.instead = kind, name, tuple(known), instead
-        super().__init__(kind, name, self.known, instead)  # With these it is unpickled.
+        super().__init__(kind, name, self.known, instead)  # Arguments for unpickling.
 
     def __str__(self) -> str:
         """Return the message."""
         close = difflib.get_close_matches(self.name, self.known, n=1)
         hint = f" Did you mean {close[0]!r}?" if close else ""
-        # A humanoid has some forty names; a longer list would hide the sentence.
+        # A humanoid has some forty names; a longer list would hide the message.
         listed = ", ".join(self.known[:_MOST_NAMES_LISTED]) or "none"
         more = len(self.known) - _MOST_NAMES_LISTED
         listed += f" and {more} more" if more > 0 else ""
@@ -93,7 +93,7 @@ class WorldError(ShapechangerError, ValueError):
 
 
 class TaskError(ShapechangerError, ValueError):
-    """Task of the user's own that cannot be used; the message names it."""
+    """Custom task that cannot be used; the message names it."""
 
 
 class PathError(ShapechangerError, ValueError):
@@ -109,7 +109,7 @@ class TransplantError(ShapechangerError, ValueError):
 
 
 class PolicyError(ShapechangerError, ValueError):
-    """File that is no policy, or a policy that does not fit its use."""
+    """File that is not a policy, or a policy that does not fit its use."""
 
 
 class StudyError(ShapechangerError, ValueError):
@@ -117,11 +117,11 @@ class StudyError(ShapechangerError, ValueError):
 
 
 class FailedRuns(StudyError):
-    """Runs of a study that failed, while all others ended."""
+    """Some runs of a study failed; all others have ended."""
 
 
 class ForeignStudy(StudyError):
-    """Output folder of something else than the study."""
+    """Folder or policy that belongs to another study, or to another version of this one."""
 
 
 class CorruptStudy(StudyError):
@@ -178,7 +178,7 @@ class MissingExtra(ShapechangerError, ImportError):
 
     def __init__(self, package: str, extra: str) -> None:
         self.package, self.extra = package, extra
-        super().__init__(package, extra)  # With these it is unpickled.
+        super().__init__(package, extra)  # Arguments for unpickling.
 
     def __str__(self) -> str:
         """Return the message."""
@@ -195,7 +195,7 @@ _Error = TypeVar("_Error", bound=Exception)
 def translate_errors(
     *kinds: type[_Error], to: Callable[[_Error], BaseException]
 ) -> Generator[None]:
-    """Raise another error for each error of these kinds, which becomes its cause.
+    """Replace errors of these kinds by the error that `to` returns; the original is its cause.
 
     ```python
     with translate_errors(OSError, to=lambda error: RobotError(f"Cannot read {file}: {error}.")):
@@ -211,7 +211,7 @@ def translate_errors(
 def check_seed(
     seed: Any,
     error: type[ShapechangerError],
-    kind: str = "A seed is",
+    kind: str = "A seed must be",
     largest: int | None = LARGEST_SEED,
 ) -> int:
     """Return a seed as an integer.
@@ -219,11 +219,11 @@ def check_seed(
     Args:
         seed: A whole number, of Python or NumPy; not a truth value.
         error: Error to raise.
-        kind: Beginning of its message, such as "The seed of a course must be".
-        largest: The largest seed; None if a generator takes any, as NumPy's do.
+        kind: Beginning of the message, such as "The seed of a course must be".
+        largest: The largest seed; None for no limit, as for NumPy's generators.
 
     Raises:
-        ShapechangerError: The given error, if it is not a whole number in this range.
+        ShapechangerError: The given error, if the seed is not a whole number in this range.
     """
     try:
         number = -1 if isinstance(seed, bool) else operator.index(seed)
@@ -236,12 +236,12 @@ def check_seed(
 
 
 def no_policy_file(path: Path, words: Iterable[str] = (), what: str = "file") -> str:
-    """Return the message about a missing policy file, with the nearest name in its folder.
+    """Return the message about a missing policy file, with the most similar name in its folder.
 
     Args:
-        path: The file, which does not exist.
-        words: Alternatives to a file, such as "reference".
-        what: What it could have been: "file", or "file or folder".
+        path: The missing file.
+        words: Names that are valid instead of a file, such as "reference".
+        what: Noun for the path: "file", or "file or folder".
     """
     siblings = (str(each) for each in path.parent.glob(f"*{glob.escape(path.suffix)}"))
     close = difflib.get_close_matches(str(path), [*words, *sorted(siblings)], n=1)

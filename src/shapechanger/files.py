@@ -20,9 +20,9 @@ _T = TypeVar("_T")
 
 
 def place_of(text: str, error: Exception) -> str:
-    """Return where a TOML text has what an error is about, as `, line 3`; empty if nowhere.
+    """Return the line of a TOML text that an error is about, such as `, line 3`; empty if unknown.
 
-    The error is an unknown name, or its message holds a path of msgspec, such as `$.gamma`.
+    The error is an unknown name, or its message contains a path of msgspec, such as `$.gamma`.
     """
     setting = re.search(r"\$\.(\w+)", str(error))
     name = error.name if isinstance(error, UnknownName) else setting and setting[1]
@@ -36,8 +36,8 @@ def read_text(path: Path) -> str:
     """Read a text file of a user, in UTF-8 with or without a byte-order mark.
 
     Raises:
-        OSError: If it cannot be read.
-        ValueError: If it has another encoding; the message can end a sentence.
+        OSError: If the file cannot be read.
+        ValueError: If the file has another encoding; the message is the end of a sentence.
     """
     data = path.read_bytes()
     try:
@@ -49,16 +49,16 @@ def read_text(path: Path) -> str:
 
 
 def read_file(path: Path, most: int) -> bytes:
-    """Return the content of a regular file, which may come from a stranger.
+    """Return the content of a regular file, which need not be trusted.
 
     Args:
         path: The file; a pipe or a device, which may never end, is refused unread.
         most: Largest size to read, bytes.
 
     Raises:
-        OSError: If it cannot be read, is not a regular file, or is larger.
+        OSError: If the path cannot be read, is not a regular file, or is larger.
     """
-    # Not blocking, because a pipe without a writer would otherwise block before it can be examined.
+    # Opened without blocking, because opening a pipe without a writer would block.
     fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     with open(fd, "rb") as file:
         found = os.fstat(fd)
@@ -75,7 +75,7 @@ def make_folder(folder: Path) -> None:
     """Make a folder and its parents, and check that it is writable.
 
     Raises:
-        OutputError: If it cannot be made or written to.
+        OutputError: If the folder cannot be made or written to.
     """
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -96,15 +96,15 @@ def require_file(path: Path) -> None:
 
 
 def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
-    """Write a file completely and flush it to disk, or leave the old one in place.
+    """Replace a file and flush it to disk; after a failure the old file is unchanged.
 
     Args:
         path: The file.
-        content: Its new content.
-        mode: Its permissions from the start; None for the permissions of the old file.
+        content: New content of the file.
+        mode: Permissions of the new file; None for the permissions of the old file.
 
     Raises:
-        OutputError: If it cannot be written.
+        OutputError: If the file cannot be written.
     """
     with writing(path):
         if mode is None and path.exists():
@@ -117,8 +117,8 @@ def write_new(path: Path, content: bytes, mode: int | None = None) -> None:
 
     Args:
         path: The file.
-        content: Its content.
-        mode: Its permissions from the start; None for the default of the process.
+        content: Content of the file.
+        mode: Permissions of the file; None for the default of the process.
 
     Raises:
         OSError: If the file exists or cannot be written.
@@ -130,20 +130,20 @@ def write_new(path: Path, content: bytes, mode: int | None = None) -> None:
 
 
 def _write(path: Path, content: bytes, mode: int | None) -> None:
-    # Two processes may write the same file.
+    # The name contains the process id, because two processes may write the same file.
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     part.unlink(missing_ok=True)
     try:
-        # The mode from the start keeps other users from reading it meanwhile.
+        # The file is created with its mode, so that other users can never read it.
         fd = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666 if mode is None else mode)
         with os.fdopen(fd, "wb") as file:
             if mode is not None:
-                part.chmod(mode)  # The umask does not apply.
+                part.chmod(mode)  # Undoes the effect of the umask.
             file.write(content)
             file.flush()
             os.fsync(fd)
         part.replace(path)
-        # After a power failure the folder must have the new name, too.
+        # Flush the folder too, so that the new name survives a power failure.
         folder = os.open(path.parent, os.O_RDONLY)
         try:
             os.fsync(folder)
@@ -166,7 +166,7 @@ def append_line(path: Path, value: Any) -> None:
 
 
 def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
-    """Read what `write_json` wrote.
+    """Read a value from a file of `write_json`.
 
     Args:
         path: The file.
@@ -183,16 +183,16 @@ def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
 
 
 def from_builtins(kind: Any, value: Any) -> Any:
-    """Read a value whose class says how, by `from_builtins`: a `dec_hook` of msgspec."""
+    """Convert a value by its class's method `from_builtins`; a `dec_hook` of msgspec."""
     return kind.from_builtins(value)
 
 
 @contextmanager
 def writing(path: Path) -> Generator[None]:
-    """Raise OSErrors of a block as OutputErrors that name the file or folder that it writes."""
+    """Convert OSErrors of a block to OutputErrors that name the file or folder `path`."""
     try:
         yield
-    except OutputError:  # A sentence already, and a subclass of OSError.
+    except OutputError:  # OutputError is a subclass of OSError.
         raise
     except OSError as error:
         raise cannot_write(path, error) from error

@@ -1,12 +1,11 @@
 """Policies and demonstrations on the Hugging Face Hub.
 
-A repository that was pushed has a card for people (`README.md`), the files, and `shapechanger.json`
-with the size and the SHA-256 of each file. A pull takes only files that this list names, of the
-kind that was asked for, and checks them; whatever else lies in the repository is left there. Files
-of the kind "policy" are models on the Hub, "demonstrations" datasets.
+A pushed repository contains a card for people (`README.md`), the files, and `shapechanger.json`, a
+list with the size and the SHA-256 of each file. A pull downloads only files of the requested kind
+that this list names, and checks them. Policies are models on the Hub, and demonstrations datasets.
 
-Log in with `hf auth login`, or set the variable HF_TOKEN. No message of
-this module repeats one of another package, which might hold the token.
+Log in with `hf auth login`, or set the variable HF_TOKEN. Messages of this module do not quote
+messages of other packages, which might contain the token.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ _NAMES: Final[dict[Kind, re.Pattern[str]]] = {
     "demonstrations": re.compile(rf"{EPISODES}/\w[\w.-]{{0,127}}/{_EPISODE_FILE}", re.ASCII),
 }
 _MAX_LIST_BYTES: Final = 64 << 20
-_TRANSFERS: Final = 8  # At once, as huggingface_hub does.
+_TRANSFERS: Final = 8  # Parallel downloads, the default of huggingface_hub.
 _LOG_IN: Final = "log in with `hf auth login`, or set HF_TOKEN"
 
 
@@ -62,7 +61,7 @@ class _Listed(msgspec.Struct):
 
 
 def features_text(layout: Layout | None, more: str = "") -> str:
-    """Return the features of a layout with their units, in Markdown; `more` without a layout."""
+    """Return the features of a layout with their units, in Markdown; `more` if it is None."""
     if layout is None:
         return more
     return f"{layout.size} numbers: " + ", ".join(f"`{feature}`" for feature in layout)
@@ -105,14 +104,14 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
     """Upload a folder, replacing an earlier push, and return the address of the commit.
 
     Args:
-        folder: The files, by their names in the repository; card and list are added to it.
-        card: What they are, in Markdown.
-        repo: Name of the repository, such as "ada/ant"; it is made if it does not exist.
+        folder: Folder with the files, to which the card and the list are added.
+        card: Description of the files, in Markdown.
+        repo: Name of the repository, such as "ada/ant"; it is created if it does not exist.
         kind: Kind of the files.
         public: Whether a new repository can be read by everybody.
 
     Raises:
-        HubError: If the Hub refuses, or the repository holds something else.
+        HubError: If the Hub refuses, or the repository contains other files.
         MissingExtra: If huggingface_hub is not installed.
     """
     repo_type = _TYPES[kind]
@@ -131,7 +130,7 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
         strange = {file.rfilename for file in found} - {".gitattributes", _CARD}
         if strange and _LIST not in strange:
             raise HubError(
-                f"{repo} holds files that Shapechanger did not push, such as {min(strange)}: "
+                f"{repo} contains files that Shapechanger did not push, such as {min(strange)}: "
                 "choose another name."
             )
         done = api.upload_folder(
@@ -149,14 +148,14 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
 
     Args:
         repo: Name of the repository, such as "ada/ant".
-        kind: Kind of its files.
-        folder: An existing folder to write to; it may hold parts of files after an error.
+        kind: Kind of the repository's files.
+        folder: An existing folder to write to; after an error it may contain incomplete files.
         revision: Commit, branch or tag; "" for the newest commit.
         max_bytes: Largest size of all files together.
 
     Raises:
-        HubError: If the Hub refuses, or the files are not those that the repository lists, are of
-            another kind, or larger.
+        HubError: If the Hub refuses, or the files differ from the repository's list, are of another
+            kind, or are larger than `max_bytes`.
         OutputError: If the folder cannot be written to.
         MissingExtra: If huggingface_hub is not installed.
     """
@@ -183,7 +182,7 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
             raise HubError(
                 f"The files of {repo} have {total} bytes, more than the limit of {max_bytes}."
             )
-        # `snapshot_download` would wait for its threads when it is interrupted.
+        # An interrupted `snapshot_download` would wait for its threads.
         with ThreadPool(_TRANSFERS) as pool:
             for _ in pool.imap_unordered(fetch, listed):
                 pass
@@ -209,15 +208,15 @@ def _listed(content: bytes, repo: str, kind: Kind) -> dict[str, _File]:
 
 @contextmanager
 def _hub(repo: str, kind: Kind) -> Generator[Any]:
-    """Import huggingface_hub, and turn its errors into sentences."""
+    """Import huggingface_hub, and convert its errors to HubErrors."""
     no_name = f"{repo!r} is no name of a repository: give owner and name, such as ada/ant."
-    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo, re.ASCII):  # No address, and no path.
+    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo, re.ASCII):
         raise HubError(no_name)
     try:
         hub = import_module("huggingface_hub")
     except ImportError as error:
         raise MissingExtra("huggingface_hub", "hub") from error
-    # Our errors are one sentence; its warnings would clutter them.
+    # Warnings and progress bars of huggingface_hub would clutter messages.
     utilities, errors = map(import_module, ("huggingface_hub.utils", "huggingface_hub.errors"))
     utilities.logging.set_verbosity_error()
     utilities.disable_progress_bars()
@@ -227,7 +226,7 @@ def _hub(repo: str, kind: Kind) -> Generator[Any]:
         raise
     except PermissionError as error:
         raise OutputError(f"Cannot write {error.filename}: {error.strerror}.") from error
-    except Exception as error:  # Also errors of the transport, which depend on the version.
+    except Exception as error:  # Classes of connection errors depend on the version.
         code = getattr(getattr(error, "response", None), "status_code", 0)
         codes = {
             401: f"The Hub requires a login for {repo}: {_LOG_IN}.",

@@ -1,11 +1,11 @@
 """Identity of an env, a method or a learner: hashes of the robot's model and of the user's files.
 
-A study, a policy and a robot are known by names: an id, a path, `module:Name`. Those stay the same
-when a file is edited. Identities tell such versions apart, so that runs of two of them are never
-averaged and a policy is never taken for one of another robot.
+The name of an env, a method or a learner, such as an id, a path or `module:Name`, stays the same if
+its file is edited. Identities distinguish such versions, so that runs of different versions are
+never averaged and a policy is never used with another robot by mistake.
 
-A module counts as the user's own if it lies neither in the standard library nor in a folder of
-installed packages, and is not of Shapechanger. What it imports counts with it.
+A module is custom if it is not in the standard library, in a folder of installed packages, or in
+Shapechanger. Custom modules that it imports are part of the identity too.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from shapechanger.registry import MODELS
 if TYPE_CHECKING:
     import gymnasium as gym
 
-# Model files, which the fingerprint of the compiled model covers, without comments.
+# Files of models, which are not hashed because the fingerprint of the compiled model covers them.
 _MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
 _NAMED: Final = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*):[A-Za-z_]\S*")
 _INSTALLED: Final = frozenset(("site-packages", "dist-packages"))
@@ -37,7 +37,7 @@ _NOT_OWN: Final = (
     *(Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib")),
     Path(__file__).resolve().parent,
 )
-# A worker process knows the script of its parent by the second name.
+# In a worker process, the script of the parent has the second name.
 _SCRIPTS: Final = ("__main__", "__mp_main__")
 _GUARD: Final = "__name__ == '__main__'"
 
@@ -46,12 +46,12 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
     """Version of an env, a method or a learner.
 
     Attributes:
-        model: Fingerprint of its compiled model, see `shapechanger.morphology.certificate`; empty
-            without one.
-        sensed: The same for parts that do not affect motion but may be observed: sensors,
-            keyframes, sites and, if frames are observed, all visible parts.
-        files: The first 16 hex digits of the SHA-256 of each user file that it needs, keyed by the
-            path in the folder that it is imported from, or by its name.
+        model: Fingerprint of the compiled model, see `shapechanger.morphology.certificate`; empty
+            without a model.
+        sensed: Fingerprint of parts of the model that do not affect motion but may be observed:
+            sensors, keyframes, sites and, if frames are observed, all visible parts.
+        files: The first 16 hex digits of the SHA-256 of each custom file, keyed by its path below
+            the folder that it is imported from, or by its name.
     """
 
     model: str = ""
@@ -61,7 +61,7 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
     def changes_to(self, other: Identity) -> str:
         """Describe how another version differs; empty if it is the same.
 
-        Models are compared where both are known.
+        Models are compared only if both identities have a model.
 
         Args:
             other: The other version, which is the newer one.
@@ -77,8 +77,8 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
         if self.model and other.model:
             found += changed("its model", self.model, other.model)
             if not found:
-                found += changed("what is sensed of its model", self.sensed, other.sensed)
-                found = [f"{text}, and its motion is the same" for text in found]
+                found += changed("the observed part of its model", self.sensed, other.sensed)
+                found = [f"{text}, but its motion is the same" for text in found]
         for name in sorted(self.files.keys() | other.files.keys()):
             found += changed(name, self.files.get(name, ""), other.files.get(name, ""))
         return ", and ".join(found)
@@ -89,13 +89,13 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> Identity:
 
     Args:
         env: The env, with its wrappers.
-        env_id: Its id, which may name a module, as `module:id`.
+        env_id: Id of the env, which may name a module, as `module:id`.
     """
     arguments: dict[str, Any] = {} if env.spec is None else dict(env.spec.kwargs)
     names = modules_of_env(env, env_id)
     model = getattr(env.unwrapped, "model", None)
     moved, sensed = "", ""
-    # No import of MuJoCo for an env that does without.
+    # The class is compared by name, so that MuJoCo is not imported for envs without it.
     compiled = (type(model).__module__.partition(".")[0], type(model).__name__)
     if is_mujoco := compiled == ("mujoco", "MjModel"):
         sees = _sees(env.observation_space)
@@ -109,7 +109,7 @@ def identify_code(names: Iterable[str], *objects: Any) -> Identity:
 
     Args:
         names: Names such as `my_methods:warm-start`, and other texts, which are skipped.
-        *objects: Objects whose modules count, too.
+        *objects: Objects whose modules are included.
     """
     return Identity(files=own_modules({*named_modules(names), *modules_of(*objects)}))
 
@@ -117,7 +117,7 @@ def identify_code(names: Iterable[str], *objects: Any) -> Identity:
 def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[tuple[str, str]]:
     """Yield name and hash of each file that an argument names, such as a robot's profile."""
     for text in filter(None, texts_in(arguments)):
-        for place in (text, f"{text}.toml"):  # `my-car` stands for my-car.toml.
+        for place in (text, f"{text}.toml"):  # `my-car` is short for my-car.toml.
             # Unlike `Path.is_file`, this is false for texts that are too long for a path, such as
             # the JSON of a body.
             if os.path.isfile(place) and not place.endswith(without):
@@ -130,7 +130,7 @@ def _hash_of(content: bytes) -> str:
 
 
 def _sees(space: gym.Space[Any]) -> bool:
-    """Return whether an observation has frames: whole numbers in rows and columns."""
+    """Return whether observations contain images: arrays of uint8 with two or more axes."""
     inner: Any = getattr(space, "spaces", None)
     if inner is not None:
         return any(map(_sees, getattr(inner, "values", lambda: inner)()))
@@ -138,16 +138,16 @@ def _sees(space: gym.Space[Any]) -> bool:
 
 
 def own_modules(names: Iterable[str]) -> dict[str, str]:
-    """Return the hash of each own module among some modules, and of those that they import.
+    """Return the hashes of custom modules, and of the custom modules that they import.
 
-    Comments count, line ends and the block `if __name__ == "__main__":` do not.
+    Comments are hashed; line ends and the block `if __name__ == "__main__":` are not.
 
     Args:
-        names: Dotted names of modules; those that are not the user's own are skipped.
+        names: Dotted names of modules; modules that are not custom are skipped.
 
     Returns:
-        The first 16 hex digits of the SHA-256 of each source, by the place of the file below the
-        folder that it is imported from, such as `tasks/jump.py`.
+        The first 16 hex digits of the SHA-256 of each source, keyed by the path below the folder
+        that it is imported from, such as `tasks/jump.py`.
     """
     found: dict[str, str] = {}
     waiting, seen = list(names), {""}
@@ -176,7 +176,7 @@ def own_modules(names: Iterable[str]) -> dict[str, str]:
 
 
 def modules_of(*objects: Any) -> set[str]:
-    """Return the names of the modules that define some objects, or their classes with all bases."""
+    """Return the names of the modules that define the objects, their classes and all bases."""
     found: set[str] = set()
     for each in objects:
         if isinstance(each, ModuleType):
@@ -193,7 +193,7 @@ def modules_of_env(env: Any, env_id: str = "") -> set[str]:
 
     Args:
         env: The env.
-        env_id: Its id, which may name a module, as `module:id`.
+        env_id: Id of the env, which may name a module, as `module:id`.
     """
     spec: Any = getattr(env, "spec", None)
     arguments: dict[str, Any] = {} if spec is None else dict(spec.kwargs)
@@ -213,10 +213,10 @@ def _is_own(path: Path) -> bool:
 
 
 def _file_of(name: str) -> Path | None:
-    """Return the file of a module, which need not have been imported; None without a file."""
+    """Return the file of a module, whether or not it is imported; None if it has no file."""
     file = getattr(sys.modules.get(name), "__file__", None)
     if name not in sys.modules:
-        # Unlike `importlib.util.find_spec`, this imports no package on the way.
+        # Unlike `importlib.util.find_spec`, this does not import the parent packages.
         folders, parts = [place for place in sys.path if _is_own(Path(place).resolve())], name
         for end in [*(m.start() for m in re.finditer(r"\.", name)), len(name)]:
             spec = PathFinder.find_spec(parts[:end], folders)
@@ -227,7 +227,7 @@ def _file_of(name: str) -> Path | None:
 
 
 def _read(source: bytes, package: str) -> tuple[bytes, list[str]]:
-    """Return the part of a source that an import runs, and the names that it may import."""
+    """Return a source without its block for scripts, and the names that it may import."""
     lines = source.removeprefix(b"\xef\xbb\xbf").splitlines()
     try:
         tree = ast.parse(b"\n".join(lines))
@@ -249,7 +249,7 @@ def _read(source: bytes, package: str) -> tuple[bytes, list[str]]:
 
 
 def _used_by(module: ModuleType | None) -> set[str]:
-    """Return the modules of the names of a module, some of which it may import by other means."""
+    """Return the modules that define a module's attributes, however they were imported."""
     values = () if module is None else tuple(vars(module).values())
     named = [each for each in values if isinstance(each, ModuleType | type) or callable(each)]
     return modules_of(*named) - {*_SCRIPTS}
@@ -266,7 +266,7 @@ def texts_in(value: Any) -> Iterator[str]:
 
 
 def named_modules(texts: Iterable[str]) -> Iterator[str]:
-    """Yield the modules that texts such as `module:Name` name."""
+    """Yield `module` for each text of the form `module:Name`."""
     for text in texts:
         if found := _NAMED.fullmatch(text):
             yield found[1]

@@ -1,7 +1,7 @@
 """Layouts: the meaning of each number of an observation or an action.
 
-A `Layout` is an ordered list of `Feature`s. Every embodiment, simulated or real, has two: one of
-its observations and one of its actions. A body map maps between two layouts.
+A `Layout` is an ordered list of `Feature`s. Every embodiment, simulated or real, has a layout of
+its observations and a layout of its actions. A body map maps between two layouts.
 
 >>> layout = Layout((Feature("hinge/angle", "rad", -1.6, 1.6), Feature("hinge/velocity", "rad/s")))
 >>> layout.size, layout.names
@@ -45,14 +45,14 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
     Attributes:
         name: Path from the element to the quantity, such as `hip_1/angle` or `shank_4/contact/fx`.
         unit: SI unit of the number; "1" for a dimensionless number.
-        low: Smallest value, in `unit`; minus infinity for none. Limits of joints are soft: a
+        low: Smallest value, in `unit`; minus infinity for no limit. Limits of joints are soft: a
             contact or a motor can press a joint a little beyond them.
-        high: Largest value, in `unit`; infinity for none.
+        high: Largest value, in `unit`; infinity for no limit.
         element: The body, joint, actuator or other part that the feature belongs to.
         shape: () for one number; the shape of the block otherwise, such as (120, 160, 3).
         gain: Effect of one unit of an action, in `gain_unit`: 150 for a motor whose control of 1
             is a torque of 150 N·m; 1 for observations.
-        gain_unit: Unit of `gain` times the feature; empty for observations.
+        gain_unit: Unit of the product of `gain` and the feature; empty for observations.
 
     Raises:
         LayoutError: If the name is empty, the range is empty or NaN, the gain is not finite and
@@ -78,8 +78,8 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
             raise LayoutError(f"{self.name}: the gain must be above zero, got {self.gain}.")
         if any(n < 1 for n in self.shape):
             raise LayoutError(f"{self.name}: the shape {self.shape} has a number below one.")
-        # JSON has no infinity, so infinite bounds are omitted; msgspec omits values that are
-        # identical to the default, not equal to it.
+        # JSON has no infinity, so infinite bounds must be omitted. msgspec only omits the default
+        # object itself, so equal values are replaced by it.
         if self.low == _LOWEST:
             msgspec.structs.force_setattr(self, "low", _LOWEST)
         if self.high == _HIGHEST:
@@ -133,11 +133,11 @@ class Layout(msgspec.Struct, frozen=True):
         return any(feature.name == name for feature in self.features)
 
     def __getitem__(self, name: str | int) -> Feature:
-        """Return the feature of a name, or of a place in the order.
+        """Return the feature with a name or an index.
 
         Raises:
             UnknownName: If no feature has this name.
-            IndexError: If there are fewer features.
+            IndexError: If the index is out of range.
         """
         if not isinstance(name, str):
             return self.features[name]
@@ -179,7 +179,8 @@ class Layout(msgspec.Struct, frozen=True):
     def matching(self, pattern: str) -> tuple[Feature, ...]:
         """Return the features whose name is `pattern` or matches it, such as `hip_*/angle`.
 
-        The exact name of a feature is not a glob, even if it has brackets, as in `wheel[0]`.
+        The exact name of a feature is not used as a glob, even if it contains brackets, such as
+        `wheel[0]`.
 
         Raises:
             UnknownName: If no such feature exists.
@@ -197,7 +198,7 @@ class Layout(msgspec.Struct, frozen=True):
 
     @classmethod
     def from_json(cls, text: str | bytes) -> Layout:
-        """Read what `to_json` wrote.
+        """Read a layout from the JSON of `to_json`.
 
         Raises:
             LayoutError: If the text is not a layout.
@@ -212,7 +213,7 @@ class Layout(msgspec.Struct, frozen=True):
 
 
 def value_names(layout: Iterable[Feature]) -> list[str]:
-    """Return a name for each value of a layout; those of a block are numbered, as in `map[3]`."""
+    """Return a name for each value of a layout; values of a block are numbered, as in `map[3]`."""
     return [
         f"{feature.name}[{place}]" if feature.shape else feature.name
         for feature in layout

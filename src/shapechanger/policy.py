@@ -1,8 +1,8 @@
-"""Policies in files: one format, one card, and one function that reads every kind.
+"""Files of policies: their format, their card, and one function that reads every kind.
 
 A file is safetensors (github.com/huggingface/safetensors: 8 bytes of length, a JSON header, then
-the numbers) with a card in JSON and a hash, or ONNX with the same card. Reading one runs no code
-from it.
+the numbers) with a card in JSON and a hash, or ONNX with the same card. Reading a file does not run
+code that it contains.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from shapechanger.layout import Layout
 from shapechanger.registry import POLICIES
 
 ONNX_CARD: Final = "shapechanger"
-"""Name of the metadata of an ONNX file that holds the card."""
+"""Key of the card in the metadata of an ONNX file."""
 STEERING: Final = ("steering", "throttle")
-"""Names of the values of an action of a policy without an action layout."""
+"""Names of the values of an action if the policy has no action layout."""
 
 _CARD: Final = "card"
 _HASH: Final = "sha256"
 # A file begins with the length of its JSON header.
 _LENGTH_BYTES: Final = 8
-_MAX_HEADER_BYTES: Final = 2**22  # Parsed JSON takes twenty times as much memory.
+_MAX_HEADER_BYTES: Final = 2**22  # Parsed JSON needs twenty times as much memory.
 MAX_BYTES: Final = 2**28
 """Size of the largest file that is read."""
-_LONGEST: Final = 200  # Longest reason, characters.
-_MAX_MEMBERS: Final = 32  # Bounds the work that a forged card can cause.
+_LONGEST: Final = 200  # Longest reason in a message, characters.
+_MAX_MEMBERS: Final = 32  # Limits the work that a forged card can cause.
 
 
 class Framing(msgspec.Struct, frozen=True, kw_only=True):
@@ -56,7 +56,7 @@ class Framing(msgspec.Struct, frozen=True, kw_only=True):
         top: Share of the rows that is cut off at the top, in [0, 1).
     """
 
-    # A quarter of the pixels of a 160 x 120 image, less the fifth in which a camera a few
+    # Half the resolution of a 160 x 120 image, without the top fifth, in which a camera a few
     # centimetres above the floor sees ceiling or sky.
     height: int = 48
     width: int = 80
@@ -89,9 +89,9 @@ class CloneNetwork(msgspec.Struct, frozen=True, kw_only=True):
         unseen: Names of state values that the policy ignores.
         low: Action for an output of -1; () for -1 each.
         high: Action for an output of 1; () for 1 each.
-        seeds: Seeds of its trainings, last one last; () for an untrained network.
-        body: Kind of robot that an exported policy learned in, such as "car"; "" for any.
-        control_hz: Actions per second that it learned with; None if unknown.
+        seeds: Seeds of the trainings in order; () for an untrained network.
+        body: Kind of robot that an exported policy was trained for, such as "car"; "" for any.
+        control_hz: Actions per second in the demonstrations; None if unknown.
     """
 
     framing: Framing
@@ -124,20 +124,20 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
     """Provenance of a policy.
 
     Attributes:
-        env: The env that it was trained in; None for recordings.
-        observation: Layout of the numbers that it observes; None for images alone.
-        action: Layout of its actions; None for steering and throttle in [-1, 1] of any vehicle.
+        env: The env of the training; None for recordings.
+        observation: Layout of the observed numbers; None for images alone.
+        action: Layout of the actions; None for steering and throttle in [-1, 1] of any vehicle.
         learner: Name of the learner.
         settings: Settings of the learner; None in an ONNX file.
-        steps: Env steps of training; of a clone, the demonstrated steps that it learned from.
+        steps: Env steps of the training; for a clone, the number of demonstrated steps.
         seed: Seed of the training.
         version: Version of Shapechanger.
-        identity: Version of the env and of the learner, see `shapechanger.transfer.versions`.
-        command: The command that wrote it; empty in a study, where `study.json` holds it.
-        start_log_std: Logarithm of the standard deviation of each action where its training started
-            from another policy; None if it did not, or if the deviation is no parameter.
-        clone: Architecture of a clone; None for other policies, whose `settings` describe it.
-        data: Origin of the demonstrations of a clone; values that JSON can hold.
+        identity: Identities of the env and the learner, see `shapechanger.transfer.identities`.
+        command: The command that wrote the file; empty in a study, whose `study.json` has it.
+        start_log_std: If the training started from another policy, the initial logarithm of the
+            standard deviation of each action; None otherwise, or if it is not a parameter.
+        clone: Architecture of a clone; None for other policies, whose `settings` define it.
+        data: Origin of the demonstrations of a clone; JSON values.
     """
 
     env: EnvRef | None = None
@@ -169,7 +169,7 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def trained_in(self) -> EnvRef:
-        """The env that it was trained in; raises PolicyError if it learned from recordings."""
+        """The env of the training; raises PolicyError if the policy learned from recordings."""
         if self.env is None:
             raise PolicyError("This policy learned from recordings without an env.")
         return self.env
@@ -204,7 +204,7 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
         return shapes | {"output": [len(net.classes) or self.action_size]}
 
     def require_layouts(self, actions: Layout, state: Layout | None = None) -> None:
-        """Raise PolicyError for a robot, an env or data with other layouts than a clone has."""
+        """Raise PolicyError if a clone's layouts differ from the layouts of a robot or an env."""
         mine, theirs = map(_text, (self.action, actions))
         if self.action is None:
             mine, theirs = ", ".join(STEERING), ", ".join(actions.names)
@@ -227,7 +227,7 @@ class Policy(ABC):
     """A policy of any kind.
 
     Attributes:
-        card: Its provenance.
+        card: Provenance of the policy.
     """
 
     card: PolicyCard
@@ -237,12 +237,12 @@ class Policy(ABC):
         """Return an action for each observation of an env, shape (n, m).
 
         Args:
-            observations: Shape (n, ...); of a clone that takes images and a state, a mapping with
+            observations: Shape (n, ...); for a clone that needs images and a state, a mapping with
                 `image` and `state`.
         """
 
     def tensors(self) -> dict[str, NDArray[Any]]:
-        """Return the arrays of its file, keyed by name."""
+        """Return the arrays of the policy's file, keyed by name."""
         raise PolicyError("A policy from an ONNX file cannot be written again: copy the file.")
 
     def carded(self, **changes: Any) -> Self:
@@ -259,7 +259,7 @@ class Policy(ABC):
 
 
 class OnnxPolicy(Policy):
-    """A trained policy from an ONNX file, whose network, `run`, needs no PyTorch."""
+    """A trained policy from an ONNX file; its network, `run`, does not need PyTorch."""
 
     def __init__(self, card: PolicyCard, run: Network) -> None:
         self.card, self._run = card, run
@@ -269,7 +269,7 @@ class OnnxPolicy(Policy):
         (size,) = self.card.shapes["observation"]
         if observations.ndim != 2 or observations.shape[1] != size:
             raise PolicyError(
-                f"This policy takes observations of shape (n, {size}), got {observations.shape}."
+                f"Observations must have the shape (n, {size}), got {observations.shape}."
             )
         return self._run({"observation": np.asarray(observations, np.float64)})
 
@@ -277,19 +277,19 @@ class OnnxPolicy(Policy):
 def load_policy(path: str | PathLike[str], algorithm: str = "") -> Any:
     """Load a policy of any kind; no code in the file is run.
 
-    Each kind is a `Policy`, with a `card` that describes its origin, and `act`, from observations
-    of shape (n, ...) to actions of shape (n, m). ONNX files need no PyTorch.
+    The result is a `Policy`: its `card` describes its origin, and its `act` maps observations of
+    shape (n, ...) to actions of shape (n, m). ONNX files do not need PyTorch.
 
     Args:
-        path: A file that a training, a study, a cloning or `shapechanger policies export` wrote,
-            read once: later changes of it have no effect.
-        algorithm: Your algorithm, a class or function as `module:name`, that the file may
-            name. A file alone may only name classes of models, of Stable-Baselines3, sb3-contrib
-            or a module that is already imported.
+        path: A file that a training, a study, a cloning or `shapechanger policies export` wrote. It
+            is read once, so later changes have no effect.
+        algorithm: Your algorithm, a class or function as `module:name`, if the file names it.
+            Without this argument, a file may only name classes of models of Stable-Baselines3,
+            sb3-contrib or a module that is already imported.
 
     Raises:
         PolicyError: If the file is missing, is not a policy, or has been changed.
-        MissingExtra: If a package that the kind needs is not installed.
+        MissingExtra: If a package that this kind of policy needs is not installed.
     """
     file = Path(path)
     exported = file.suffix == ".onnx"
@@ -315,17 +315,17 @@ def save_policy(policy: Policy, path: str | PathLike[str]) -> None:
     """Write a policy of any kind to a file, such as `Ant-v1.safetensors`.
 
     Raises:
-        OutputError: If it cannot be written.
+        OutputError: If the file cannot be written.
     """
     policy.save(Path(path))
 
 
 def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes) -> bytes:
-    """Return the content of a file, with its card in JSON; equal ones give equal bytes."""
-    # Safetensors keeps the bytes of an array as they lie in memory.
+    """Return the content of a policy file; equal arguments give equal bytes."""
+    # Safetensors would store the bytes of an array in the order of its memory.
     arrays = {name: np.asarray(value, order="C") for name, value in tensors.items()}
     content = _safetensors().save(arrays, metadata={_CARD: card.decode()})
-    # Safetensors writes the metadata in any order: write the header again with sorted metadata.
+    # Safetensors writes the metadata in random order, so the header is written again.
     end = _LENGTH_BYTES + int.from_bytes(content[:_LENGTH_BYTES], "little")
     header = json.loads(content[_LENGTH_BYTES:end])
     header["__metadata__"][_HASH] = _digest(card, arrays)
@@ -335,7 +335,7 @@ def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes) -> bytes:
 
 
 def read_tensors(path: Path) -> tuple[PolicyCard, dict[str, NDArray[Any]]]:
-    """Read a file of safetensors: its card, and the arrays keyed by name."""
+    """Return the card of a file of safetensors, and its arrays keyed by name."""
     content = read_file(path, MAX_BYTES)
     length = int.from_bytes(content[:_LENGTH_BYTES], "little")
     try:
@@ -348,7 +348,7 @@ def read_tensors(path: Path) -> tuple[PolicyCard, dict[str, NDArray[Any]]]:
     tensors = _safetensors().load(content)
     card = metadata[_CARD].encode()
     if _digest(card, tensors) != metadata[_HASH]:
-        raise ValueError("its card or its numbers do not have its hash")
+        raise ValueError("its card or its numbers do not match its hash")
     return msgspec.json.decode(card, type=PolicyCard), tensors
 
 
@@ -358,7 +358,7 @@ def _safetensors() -> Any:
 
 
 def _digest(card: bytes, tensors: Mapping[str, NDArray[Any]]) -> str:
-    """SHA-256 over card, names, types, shapes and numbers."""
+    """Return the SHA-256 of card, names, types, shapes and numbers."""
     digest = hashlib.sha256(f" {len(card)} ".encode() + card)
     for name in sorted(tensors):
         array = tensors[name]
@@ -372,12 +372,12 @@ Network = Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float32]]
 
 
 def read_network(path: Path) -> tuple[PolicyCard, Network]:
-    """Read an ONNX file: its card, and its network, which runs on the CPU without PyTorch."""
+    """Return the card of an ONNX file, and its network, which runs on the CPU without PyTorch."""
     content = read_file(path, MAX_BYTES)
     with translate_errors(ImportError, to=lambda _: MissingExtra("onnxruntime", "onboard")):
         runtime: Any = import_module("onnxruntime")
     options = runtime.SessionOptions()
-    # One policy is small: more threads would only wait for one another.
+    # More threads do not make a small network faster.
     options.intra_op_num_threads = 1
     options.log_severity_level = 4  # Errors are raised instead of being logged.
     session = runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
@@ -396,8 +396,9 @@ def export_network(
 ) -> None:
     """Write a network of PyTorch as ONNX, with the card of its policy, without its settings.
 
-    Its `forward` takes the inputs in their order, each given by an example of shape (2, ...), whose
-    first axis stands for any number. The card's last shape names the output; facts are metadata.
+    The arguments of its `forward` are the inputs in their order. Each value of `inputs` is an
+    example of shape (2, ...), whose first axis may have any length in the file. The last key of the
+    card's `shapes` is the name of the output. `facts` are additional metadata.
 
     Raises:
         MissingExtra: If onnx or onnxscript is not installed.
@@ -408,13 +409,13 @@ def export_network(
     torch: Any = import_module("torch")
 
     def hypot(x: Any, y: Any) -> Any:
-        """Translate the length of an edge, which ONNX lacks."""
+        """Translate `hypot`, which ONNX lacks."""
         return operators.Sqrt(operators.Add(operators.Mul(x, x), operators.Mul(y, y)))
 
     many = torch.export.Dim("n", min=1)
     log = logging.getLogger("torch.onnx")
     level = log.level
-    log.setLevel(logging.ERROR)  # The exporter warns of packages that these networks do not need.
+    log.setLevel(logging.ERROR)  # Hide warnings about packages that these networks do not need.
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

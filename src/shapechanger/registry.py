@@ -1,7 +1,7 @@
 """Registries of parts that packages can add: learners, transfer methods and kinds of policies.
 
 A part ships with Shapechanger, is registered by a module that has been imported, or is an entry
-point of an installed package. It is imported when it is first asked for.
+point of an installed package. It is imported on first use.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Registry(Generic[_Part]):
     Args:
         kind: Noun for a part, for messages, such as "method".
         group: Group of the entry points, such as "shapechanger.methods".
-        shipped: Places of the parts that ship, `module:attribute` below `shapechanger`, by name.
+        shipped: `module:attribute` below `shapechanger` of each shipped part, keyed by name.
     """
 
     def __init__(self, kind: str, group: str, shipped: dict[str, str]) -> None:
@@ -32,16 +32,16 @@ class Registry(Generic[_Part]):
         self._registered: dict[str, _Part] = {}
 
     def register(self, name: str, part: _Part) -> None:
-        """Register a part, a class.
+        """Register a class as a part.
 
         Raises:
-            StudyError: If the name is empty, has other characters than letters, digits, - and _, or
-                is taken.
+            StudyError: If the name is empty, is already in use, or contains other characters than
+                letters, digits, - and _.
         """
         title = getattr(part, "__name__", repr(part))
         if not name.replace("-", "").replace("_", "").isalnum():
             raise StudyError(
-                f"A {self._kind}'s name is made of letters, digits, - and _, and {title}'s is "
+                f"The name of {self._kind} {title} must have only letters, digits, - and _, got "
                 f"{name!r}."
             )
         other = self._registered.get(name)
@@ -54,7 +54,7 @@ class Registry(Generic[_Part]):
         self._registered[name] = part
 
     def names(self) -> tuple[str, ...]:
-        """Return all names: of parts that ship, are installed and are registered."""
+        """Return the names of all shipped, installed and registered parts."""
         installed = (point.name for point in entry_points(group=self._group))
         return tuple(dict.fromkeys([*self._places, *installed, *self._registered]))
 
@@ -129,12 +129,12 @@ POLICIES: Final[Registry[Any]] = Registry(
         "clone-onnx": "demos.cloning.clone:Clone",
     },
 )
-"""Functions that read a file, by the kind of policy that its header names."""
+"""Functions that build a policy from the content of a file, keyed by kind of policy."""
 
 ROBOTS: Final[Registry[Any]] = Registry(
     "reader of robots", "shapechanger.robots", {"profile": "vehicles.twin:read_robot"}
 )
-"""Readers of the numbers of a robot for its simulation, which imports no robot."""
+"""Functions that read a robot for its simulation, so that simulations do not import robots."""
 
 MODELS: Final[Registry[Any]] = Registry(
     "kind of model", "shapechanger.models", {"mujoco": "morphology.certificate.changes"}
@@ -144,4 +144,4 @@ MODELS: Final[Registry[Any]] = Registry(
 MAKERS: Final[Registry[Any]] = Registry(
     "maker of vector envs", "shapechanger.makers", {"make_vec": "envs.make_vec:make_vec"}
 )
-"""Functions like `shapechanger.make_vec`, so that learners import no env."""
+"""Functions that make vector envs, so that learners do not import envs."""

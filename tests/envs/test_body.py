@@ -354,9 +354,9 @@ def test_an_argument_of_another_type_is_refused(
 def test_what_is_no_seed_is_refused(seed: Any) -> None:
     """A seed is refused before anything changes; NumPy's integers equal Python's."""
     with contextlib.closing(gym.make("shapechanger/Ant-v1", disable_env_checker=True)) as env:
-        with pytest.raises(EnvArgumentError, match="A seed is a whole number from 0, got "):
+        with pytest.raises(EnvArgumentError, match="A seed must be a whole number from 0, got "):
             env.reset(seed=seed)
-        with pytest.raises(EnvArgumentError, match="A seed is a whole number from 0, got "):
+        with pytest.raises(EnvArgumentError, match="A seed must be a whole number from 0, got "):
             env.unwrapped.drawn_bodies(2, seed, "training")  # type: ignore[attr-defined]
         same = [env.reset(seed=cast("Any", one))[0] for one in (2**63, np.uint64(2**63))]
         np.testing.assert_array_equal(*same)

@@ -118,7 +118,7 @@ _NOT_PLANNED: list[tuple[dict[str, Any], type[Exception], str]] = [
         "No argument of InvertedPendulum matches 'colour'",
     ),
     *(
-        ({name: steps}, StudyError, f"{steps} {which} steps is smaller than one.*32")
+        ({name: steps}, StudyError, f"{steps} {which} steps is too small.*32")
         for name, which in (("steps", "target"), ("source_steps", "source"))
         for steps in (1, 31)
     ),
@@ -127,7 +127,7 @@ _NOT_PLANNED: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"seeds": 1}, StudyError, "at least 2 seeds"),
     # What a generator would refuse after hours.
     *(
-        ({"seed": seed}, StudyError, "A seed is a whole number from 0 to 4294967295, got ")
+        ({"seed": seed}, StudyError, "A seed must be a whole number from 0 to 4294967295, got ")
         for seed in (-1, 2**32, 2**64, 0.5, True, "3")
     ),
     ({"arms": ("scratch", "fine-tun")}, UnknownName, "'fine-tune'"),

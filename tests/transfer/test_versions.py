@@ -67,10 +67,10 @@ _EDITS = {
         XML.format(1.5).replace('damping="5"', 'damping="6"'),
         r"a\.xml.*: its model has changed from \w+ to \w+",
     ),
-    "what is sensed": (
+    "the observed part": (
         "b.xml",
         XML.format(2.5).replace("</body>", '<site name="tip" pos="0 0 1"/></body>'),
-        "what is sensed of its model has changed .* its motion is the same",
+        "the observed part of its model has changed .* its motion is the same",
     ),
     "the task": (
         "shared_task.py",

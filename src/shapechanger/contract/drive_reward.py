@@ -1,7 +1,8 @@
 """The driving task: go forward fast without collisions and without getting stuck.
 
-The paper of 2017 asks a car to "avoid collisions while maximizing velocity"; its program had a
-reward of 0.0 everywhere. Here each term needs a measured quantity, and is omitted without one.
+The paper of the original release (2017) asks a car to "avoid collisions while maximizing velocity";
+its program returned a reward of 0.0 at every step. Here a term is omitted if its quantity is not
+measured.
 """
 
 from __future__ import annotations
@@ -51,13 +52,13 @@ class DriveReward:
 
         Args:
             speed_mps: Forward speed, m/s, negative backwards; None if it is not measured.
-            collided: Whether it collided since the step before; None if unknown.
-            stalled: Whether it pushes without moving; None if unknown.
+            collided: Whether the robot has collided since the last step; None if unknown.
+            stalled: Whether the robot pushes without moving; None if unknown.
             dt_s: Duration of the step, s, at least 0.
 
         Returns:
-            `reward_velocity`, `reward_collision` and `reward_stall`, without those whose quantity
-            is None. Each is finite where the quantities are.
+            `reward_velocity`, `reward_collision` and `reward_stall`, each only if its quantity is
+            not None; finite if the quantities are finite.
         """
         terms: dict[str, float] = {}
         if speed_mps is not None:

@@ -1,19 +1,19 @@
-"""Envs as values, and the facts that transfer reads from an env.
+"""Ids and arguments of envs as values, and the properties of an env that transfer needs.
 
-Beyond Gymnasium's interface, an env may have these attributes; their presence enables features:
+In addition to Gymnasium's interface, an env may have these attributes, which enable features:
 
 - `observation_layout`, `action_layout` and `measures`: see `EnvTraits`.
 - `demonstrator(seed)`: an expert for its task, a `TaskDemonstrator`; `seed` draws its mistakes.
-- `taught_by(act, seed)`: a `TaskDemonstrator` from a policy of the env with the id `teacher_env`.
-  `act` maps observations of that env, (n, k), to actions, (n, m).
-- `hold_out()`: draws its surroundings from now on from a set that training never uses.
+- `taught_by(act, seed)`: a `TaskDemonstrator` that uses a policy of another env, whose id is
+  `teacher_env`. `act` maps observations of that env, (n, k), to its actions, (n, m).
+- `hold_out()`: makes later resets draw the surroundings from a set that training never uses.
 - `family_name`: the continuous family of its body. `arguments_towards(target, alpha)` returns
   arguments for the body that lies at `alpha`, 0 to 1, between this body and the target's;
   `arguments_between(target)` returns arguments that draw such a body at each reset; and
   `drawn_bodies(count, seed, split)` returns bodies from a split of the family, as JSON.
 - `tree`: the trunk and the limbs of its body, a `shapechanger.morphology.tree.Tree`.
-- `randomised_source()` and `identified_source(seed)`: arguments of a source env whose body is
-  randomised over the bodies that this env may have, or is identified from motions of this env.
+- `randomised_source()`: arguments of a source env whose body is drawn from the bodies that this env
+  may have. `identified_source(seed)`: arguments that are identified from motions of this env.
 - `certify_shift(source, target)`: the certificate of the change between two envs.
 """
 
@@ -39,14 +39,14 @@ class EnvRef(msgspec.Struct, frozen=True):
 
     Attributes:
         id: A registered id, or `module:id` to import a module first.
-        kwargs: Arguments of `gymnasium.make` that JSON can hold, such as a body as JSON.
+        kwargs: Arguments of `gymnasium.make`; JSON values, such as a body as JSON text.
     """
 
     id: str
     kwargs: dict[str, Any] = {}
 
     def __str__(self) -> str:
-        """The id, with the arguments if there are any."""
+        """Return the id and the arguments."""
         arguments = ", ".join(f"{name}={value}" for name, value in self.kwargs.items())
         return f"{self.id} ({arguments})" if arguments else self.id
 
@@ -62,7 +62,7 @@ class EnvRef(msgspec.Struct, frozen=True):
 
         Raises:
             UnknownName: If no env has this id.
-            StudyError: If it does not take these arguments.
+            StudyError: If the env does not accept these arguments.
         """
         try:
             return gym.make(self.id, **{**self.kwargs, **more})
@@ -70,7 +70,7 @@ class EnvRef(msgspec.Struct, frozen=True):
             known = [name for name in gym.registry if name.startswith("shapechanger/")]
             raise UnknownName("environment", self.id, known) from error
         except TypeError as error:
-            # Gymnasium adds this where the constructor of the env refuses an argument.
+            # Gymnasium adds this text if the constructor of the env refuses an argument.
             reason, refused, _ = str(error).partition(" was raised from the environment creator")
             if not refused:
                 raise
@@ -82,7 +82,7 @@ class BodyDraw(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         split: Part of the family: "train", "interpolation", "extrapolation" or "composition".
-        count: How many bodies.
+        count: Number of bodies.
         seed: Seed of the draws.
     """
 
@@ -96,12 +96,12 @@ def each_body(env: EnvRef) -> list[EnvRef]:
 
     Args:
         env: An env; its argument `bodies` is a list of bodies as JSON, or a `BodyDraw` as a
-            mapping. Without the argument, the env itself is the only one.
+            mapping. Without the argument, the result is the env itself.
 
     Raises:
-        StudyError: If `bodies` is neither, or the env's body belongs to no family.
+        StudyError: If `bodies` is invalid, or the env's body belongs to no family.
         UnknownName: If there is no such split.
-        MorphologyError: If the family cannot be drawn from.
+        MorphologyError: If no bodies can be drawn from the family.
     """
     if "bodies" not in env.kwargs:
         return [env]
@@ -123,16 +123,16 @@ def each_body(env: EnvRef) -> list[EnvRef]:
 
 
 class Measure(msgspec.Struct, frozen=True):
-    """A number of an episode, larger is better.
+    """A performance metric of an episode; larger is better.
 
     The return often includes a reward for survival: an ant that stands still earns 1,000. A measure
-    quantifies only skill. Envs declare their measures as the attribute `measures`; the first one is
+    only quantifies skill. Envs declare their measures as the attribute `measures`; the first one is
     the default of a study.
 
     Attributes:
         name: Name, such as "forward speed".
         unit: Unit; "1" for a pure number.
-        key: Key of the step's `info` that it is read from; empty for the return.
+        key: Key of the measured number in the step's `info`; empty for the return.
         over: "episode": the sum over the episode divided by the env's time limit, so that an
             episode that ends early counts as standing still for the rest; "end": the last value.
     """
@@ -156,7 +156,7 @@ class TaskDemonstrator(Protocol):
         ...
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the intended action, which is learned, and the executed one."""
+        """Return the intended action, which is to be learned, and the executed action."""
         ...
 
 
@@ -167,15 +167,15 @@ class EnvTraits:
     Attributes:
         observation_layout: Meaning of an observation.
         action_layout: Meaning of an action.
-        observation_space: Its space.
-        action_space: Its space.
-        exclusive: Whether only one run at a time may use the env, as a robot.
+        observation_space: Space of observations.
+        action_space: Space of actions.
+        exclusive: Whether only one run at a time may use the env, such as a robot.
         individual: Name of the argument that selects one of several robots; may be empty.
-        has_demonstrator: Whether it has an expert for its task.
-        adapts_source: Whether it can adapt its source.
-        family: Name of the continuous family that its body belongs to; may be empty.
-        measures: The metrics of a policy, the default first.
-        identity: The version of its robot and of the user's own files.
+        has_demonstrator: Whether the env has an expert for its task.
+        adapts_source: Whether the env has `identified_source` and `randomised_source`.
+        family: Name of the continuous family of the env's body; may be empty.
+        measures: The performance metrics of a policy, the default first.
+        identity: Identity of the env's robot and of its custom files.
     """
 
     observation_layout: Layout
@@ -191,7 +191,7 @@ class EnvTraits:
     identity: Identity
 
     def same_layouts(self, other: EnvTraits) -> bool:
-        """Return whether observations and actions mean the same in another env."""
+        """Return whether another env has equal layouts."""
         mine, theirs = self.observation_layout, other.observation_layout
         return mine == theirs and self.action_layout == other.action_layout
 
@@ -201,10 +201,10 @@ def env_traits(env: gym.Env[Any, Any], env_id: str = "") -> EnvTraits:
 
     Args:
         env: The env.
-        env_id: Its id, which may name a module.
+        env_id: Id of the env, which may name a module.
 
     Raises:
-        LayoutError: If it publishes no layouts.
+        LayoutError: If the env publishes no layouts.
     """
     observation, action = layouts_of(env)
     inner = env.unwrapped
@@ -224,12 +224,12 @@ def env_traits(env: gym.Env[Any, Any], env_id: str = "") -> EnvTraits:
 
 
 def hold_out(env: gym.Env[Any, Any]) -> None:
-    """Let an env that has a held-out set draw its surroundings from it from now on."""
+    """Make later resets of an env draw held-out surroundings, if the env has any."""
     getattr(env.unwrapped, "hold_out", lambda: None)()
 
 
 def is_single_instance(env: gym.Env[Any, Any]) -> bool:
-    """Return whether only one instance can exist (`side_by_side = False`), such as of a robot."""
+    """Return whether only one instance of an env can exist, such as of a robot."""
     return not getattr(env.unwrapped, "side_by_side", True)
 
 
@@ -245,10 +245,10 @@ def is_reward_term(name: str) -> bool:
 
 
 def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
-    """Return the observation and the action layout of an env, or of its outermost wrapper with one.
+    """Return the observation and the action layout of the outermost wrapper that publishes them.
 
     Raises:
-        LayoutError: If it publishes none.
+        LayoutError: If neither a wrapper nor the env publishes layouts.
     """
     names = ("observation_layout", "action_layout")
     found = [env.get_wrapper_attr(n) for n in names if env.has_wrapper_attr(n)]

@@ -1,7 +1,7 @@
-"""Caps, slew, duty cycles and the reflexes of motion, as functions of a plan without a clock.
+"""Caps, slew, duty cycles and motion reflexes of a robot; the caller provides the time.
 
-The guard calls them on a robot, and a simulation of the robot calls them too, so that both move
-the same way. They use only the standard library.
+The guard of a robot and its simulation both use this module, so that they move in the same way. It
+only imports the standard library.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan
 
-_SAME = 1e-6  # A cap that was stored as a 32-bit float is still the cap.
+_SAME = 1e-6  # Tolerance for values that were rounded to 32-bit floats.
 # gpiozero over lgpio has steps of 1 % (`LGPIOPin._set_state`: `int(value * 100)`). Rounding to them
 # here makes all pin factories equal, and the returned value is the applied one.
 _STEPS = 100
-# Speed below which a robot stands still, m/s: one count per second of a coarse encoder.
+# Speed below which a robot counts as standing, m/s: one count per second of a coarse encoder.
 _STANDS_M_PER_S = 0.01
 
 
@@ -38,8 +38,8 @@ def clipped(action: ActionPlan, value: float) -> bool:
 def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> float:
     """Return the next value on the way to the target.
 
-    The slew limits it away from rest and towards rest, and it pauses at rest for one step when it
-    changes sides. A three-level motor has no slew.
+    The slew limits the change away from rest and towards rest. A value that changes to the other
+    side of rest stays at rest for one step. A three-level motor has no slew.
 
     Args:
         action: The action.
@@ -60,10 +60,10 @@ def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> floa
 
 @dataclass(frozen=True, slots=True)
 class Duty:
-    """Duty cycles of a motor: conversion of an output value to the share of time that it is on.
+    """Conversion of an output value to a duty cycle, the share of time that a motor is on.
 
     Attributes:
-        start: Smallest duty that moves the motor, 0 to 1; the smallest values are mapped there.
+        start: Smallest duty that moves the motor, 0 to 1; values just above 0 are mapped to it.
         full: Duty at a value of 1, above `start` and at most 1.
     """
 
@@ -81,7 +81,7 @@ class Duty:
         return duty if int(duty * _STEPS) == steps else math.nextafter(duty, 1.0)
 
     def size_at(self, duty: float) -> float:
-        """Return the magnitude of the value of a duty cycle; above 0 for every duty above 0."""
+        """Return the magnitude of the value with a duty cycle; above 0 for every duty above 0."""
         if duty <= 0.0:
             return 0.0
         # A duty that was rounded to just below `start` still turns the motor.
@@ -93,7 +93,7 @@ class Bump:
 
     Attributes:
         count: Number of bumps.
-        until_ns: When the robot may go forward again; None if it never bumped.
+        until_ns: Time from which the robot may go forward again, ns; None before the first bump.
     """
 
     def __init__(self, hold_ms: int) -> None:
@@ -116,9 +116,9 @@ class Bump:
 
 
 class Stall:
-    """Detect a push without motion, and block further pushing.
+    """Detect a push without motion, and block further pushing in this direction.
 
-    The block ends once the command asks for rest or for the other direction.
+    The block ends as soon as a command requests rest or the other direction.
 
     Attributes:
         way: Sign of the push that stalled; 0 for none.
@@ -148,7 +148,7 @@ class Stall:
             self.way = pushing
 
     def ask(self, push: float) -> None:
-        """Update with the push that the command asks for."""
+        """Update with the push that the command requests, -1 to 1."""
         if self.way * push <= 0.0:
             self.way = 0
 
@@ -157,15 +157,15 @@ class Propulsion:
     """Forward component of the actions; positive is forward.
 
     Attributes:
-        forward: Which actions push the robot forward or backward, by index.
+        forward: Indices of the actions that push the robot forward or backward.
     """
 
     def __init__(self, actions: Sequence[ActionPlan]) -> None:
         self._actions = actions
-        # A turning action may propel, as a tank's does, but never forward.
+        # The steering of a tank propels too, but never forward.
         self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != "steering")
         self._rests = [(i, actions[i].rest) for i in self.forward]
-        # Actions whose profile gives a speed.
+        # Indices of the actions for which the profile states a speed.
         self._known = tuple(i for i in self.forward if actions[i].unit == "m/s")
 
     def push(self, values: Sequence[float]) -> float:
@@ -184,7 +184,7 @@ class Propulsion:
 
 
 class MotionReflexes:
-    """Reflexes that stop motion towards objects that the robot touches, nears or pushes against.
+    """Reflexes that block motion if the robot touches, approaches or pushes against an object.
 
     Attributes:
         bump: Contacts of the bumpers.
@@ -217,7 +217,7 @@ class MotionReflexes:
         self.stall.sense(quantities, push, now_ns)
 
     def hold_back(self, aims: Sequence[float], now_ns: int) -> tuple[tuple[float, ...], str]:
-        """Return the target of each action without forbidden motion, and why it was changed."""
+        """Return the allowed target of each action, and the reasons for changes as text."""
         if self.stall.way:
             self.stall.ask(self.propulsion.push(aims))
         bumped, stalled = self.bump.blocks(now_ns), self.stall.way

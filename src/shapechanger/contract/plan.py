@@ -1,8 +1,8 @@
-"""Plan of a robot: its actions, outputs, sensors and limits, as a profile states them.
+"""Plan of a robot: the actions, outputs, sensors and limits of its profile.
 
 The guard of a robot and its simulations use the same plan. The classes are tables of a profile
-(`shapechanger.robot.profile`), with bounds that are checked when it is loaded. They are in this
-module because the guard imports only msgspec and its drivers, and are sent to the guard as JSON.
+(`shapechanger.robot.profile`), whose bounds are checked when it is loaded. They are in this module
+because the guard only imports msgspec and its drivers. The guard receives the plan as JSON.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ class ActionPlan:
         name: Name, such as "steering".
         low: Lower cap; smaller values are clipped.
         high: Upper cap. The full range of an action is -1 to 1, or 0 to 1 if `one_sided`.
-        rest: Value at rest, at which every stop ends.
+        rest: Value at rest, which is also the value after a stop.
         slew_per_s: Fastest change away from rest, 1/s.
         slew_down_per_s: Fastest change towards rest, 1/s. An action that propels has no limit.
         levels: "any", or "three" for a motor with only full left, off and full right.
         threshold: Magnitude from which a value counts as full if `levels` is "three".
-        propels: Whether it propels the robot; such an action rests at once in a stop.
+        propels: Whether the action propels the robot; a stop sets such an action to rest at once.
         one_sided: Whether the range is 0 to 1.
-        unit: Unit of the quantity that it moves, if that is an angle or a length.
+        unit: Unit of the physical quantity that the action sets; "1" if it is not known.
         gain: Effect of one unit of the action, in `unit`.
     """
 
@@ -65,7 +65,7 @@ class ActionPlan:
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Yield each key that contradicts others, with the reason as the end of a sentence."""
+        """Yield each key that contradicts other keys, and the end of a sentence about it."""
         if self.one_sided and self.low < 0.0:
             yield "low", "must be 0 to 1, because it is one-sided"
         if not self.low < self.high:
@@ -88,10 +88,10 @@ class OutputPlan:
 
     Attributes:
         name: Name, such as "left".
-        driver: Name of its driver, such as "hbridge".
-        part: The part that it moves, such as "wheels" or "left track"; may be empty.
+        driver: Name of the driver, such as "hbridge".
+        part: The part that the output moves, such as "wheels" or "left track"; may be empty.
         mix: Weight of each action.
-        offset: Value where all actions are 0.
+        offset: Value if all actions are 0.
         settings: Settings of the driver, such as pins and pulse widths, with all defaults filled
             in.
     """
@@ -111,7 +111,7 @@ class SensorPlan:
     Attributes:
         name: Name, such as "bumper".
         driver: Name of its driver, such as "switch".
-        measures: What it measures: "speed", "bump", "distance", "imu", "battery",
+        measures: Measured quantity: "speed", "bump", "distance", "imu", "battery",
             "temperature", "tendons" or "joints".
         settings: Settings of the driver, with all defaults filled in.
     """
@@ -127,13 +127,13 @@ class LimitPlan:
     """Limits beyond which the robot stops by itself.
 
     Attributes:
-        deadline_ms: Time for which the newest command acts before the robot stops, ms.
-        camera_stale_ms: Age of the newest frame from which the robot stops, ms, 500 if a profile
-            does not state it; 0 for a robot without a camera.
+        deadline_ms: Time for which the newest command is valid before the robot stops, ms.
+        camera_stale_ms: Age of the newest frame at which the robot stops, ms; 0 for a robot without
+            a camera. The default of a profile with a camera is 500.
         bump_hold_ms: Time for which a bump blocks forward motion, ms. All bumpers count as front
             bumpers, so the robot may still reverse.
-        stop_distance_m: Distance ahead below which forward motion is blocked, as it is while a
-            sensor has no reading; 0 to disable.
+        stop_distance_m: Distance ahead below which forward motion is blocked, m; 0 to disable.
+            Forward motion is also blocked while a distance sensor has no reading.
         stall_s: Longest push without motion before the robot stops, s; 0 to disable.
         stall_throttle: Propulsion above which motion is expected.
         low_battery_v: Voltage below which the robot stops, V; 0 to disable.
@@ -164,9 +164,9 @@ class StopPlan:
     """Course of a stop for the actions that do not propel.
 
     Attributes:
-        hold_ms: Time for which they hold their value, ms.
-        ramp_ms: Duration of the ramp to rest after that, ms.
-        then: Whether the outputs then hold at rest or are released.
+        hold_ms: Time for which the actions keep their values, ms.
+        ramp_ms: Duration of the following ramp to rest, ms.
+        then: Whether the outputs stay powered at rest after the ramp ("hold") or are released.
     """
 
     hold_ms: Annotated[int, Meta(ge=0, le=10_000)] = 0
@@ -180,17 +180,17 @@ class GuardPlan:
 
     Attributes:
         name: Name of the robot.
-        actions: The numbers of a command, in order.
-        outputs: The outputs that they move.
-        sensors: The sensors that it reads.
-        limits: When the robot stops by itself.
+        actions: The actions of a command, in order.
+        outputs: The outputs that the actions move.
+        sensors: The sensors that the guard reads.
+        limits: Limits beyond which the robot stops by itself.
         stop: Course of a stop.
-        enable_pin: BCM pin that is toggled while the guard lives, for the one-shot that holds the
-            enable line of the motors; None without one.
-        stop_pin: BCM pin of an emergency stop button to ground; None without one.
-        tick_hz: Rate at which the rules run when nothing happens, Hz.
-        enable_hold_ms: How long the one-shot holds the enable line after the last toggle of
-            `enable_pin`. The guard does not need it; a twin of the wiring does.
+        enable_pin: BCM pin that the guard toggles while it runs, for the one-shot circuit that
+            keeps the enable line of the motors active; None without it.
+        stop_pin: BCM pin of an emergency stop button to ground; None without a button.
+        tick_hz: Rate at which the rules run without commands, Hz.
+        enable_hold_ms: Time for which the one-shot keeps the enable line active after the last
+            toggle of `enable_pin`, ms. Only a twin of the wiring uses it.
     """
 
     name: str
@@ -206,7 +206,7 @@ class GuardPlan:
 
     def to_json(self) -> str:
         """Return the plan as JSON."""
-        return json.dumps(asdict(self))  # Slews may be infinite.
+        return json.dumps(asdict(self))  # Unlike msgspec, json keeps infinite slews.
 
     @classmethod
     def from_json(cls, text: str) -> GuardPlan:
@@ -219,7 +219,7 @@ def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...
 
     Args:
         plan: The robot.
-        actions: One number for each of its actions, in order.
+        actions: One number for each action of the robot, in order.
 
     Raises:
         ValueError: If the number of actions is wrong.
@@ -237,7 +237,7 @@ def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...
 
 
 def driven_pins(plan: GuardPlan) -> dict[int, str]:
-    """Return the use of each pin that drives an output or the enable line, by BCM number."""
+    """Return the use of each pin that drives an output or the enable line, keyed by BCM number."""
     keys = ("forward", "backward", "enable", "phase", "pin")
     used = {o.settings.get(key, -1): f"{o.name} {key}" for o in plan.outputs for key in keys}
     enable = {} if plan.enable_pin is None else {plan.enable_pin: "enable line"}

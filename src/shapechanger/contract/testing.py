@@ -25,12 +25,12 @@ from shapechanger.errors import ShapechangerError
 MakeEnv = Callable[[], gym.Env[Any, Any]]
 """Makes a new env."""
 
-# Observations with their rewards.
+# Observations and rewards of a start and its steps.
 _Rollout = list[tuple[Any, float]]
 
 _STEPS: Final = 50
 _SEED: Final = 7
-# A number of single precision may exceed its limit by rounding.
+# Relative tolerance for limits, because numbers are rounded to single precision.
 _ROUNDING: Final = 1e-6
 
 
@@ -46,7 +46,7 @@ def _require(kept: bool, sentence: str) -> None:
 def passes_gymnasiums_checker(make: MakeEnv) -> None:
     """Passes Gymnasium's `check_env`."""
     with warnings.catch_warnings(), make() as env:
-        # Advice on spaces with another range than -1 to 1 is not a failure.
+        # Warnings about ranges of spaces are not failures.
         warnings.filterwarnings("ignore", message=".*symmetric and normalized space.*")
         warnings.filterwarnings("ignore", message=".*(minimum|maximum) value is -?infinity.*")
         try:
@@ -74,7 +74,7 @@ def names_every_number(make: MakeEnv) -> None:
     with make() as env:
         observation, action = layouts_of(env)
         for side, layout, space, kinds in (
-            # An image is one block of a layout, and so is each part of a Dict.
+            # An image, or an entry of a Dict, is one feature of a layout.
             ("observation", observation, env.observation_space, (gym.spaces.Box, gym.spaces.Dict)),
             ("action", action, env.action_space, (gym.spaces.Box,)),
         ):
@@ -90,7 +90,7 @@ def names_every_number(make: MakeEnv) -> None:
 
 
 def pickles(make: MakeEnv) -> None:
-    """A pickled env, and one made from the JSON of its spec, behave like the env."""
+    """Envs that are made from its pickle and from the JSON of its spec behave like the env."""
     env = make()
     try:
         again = [pickle.loads(pickle.dumps(env))]
@@ -116,7 +116,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
             f"The simulation diverges at step {step + 1} of random actions: give the actuators a "
             "narrower range, motors of a rig a smaller gear, or the model a shorter time step.",
         )
-        # A mapping contains all terms together, or their sources.
+        # A mapping is not a term: it contains all terms, or their sources.
         named = (value for name, value in info.items() if is_reward_term(name))
         terms = [float(value) for value in named if not isinstance(value, Mapping)]
         _require(bool(terms), "info reports no reward terms.")
@@ -180,7 +180,7 @@ def _same(first: _Rollout, second: _Rollout) -> bool:
 
 
 def _arrays(observation: Any) -> list[Any]:
-    """Return the arrays of an observation, of which a Dict has several."""
+    """Return the arrays of an observation; an observation of a Dict space has several."""
     if isinstance(observation, Mapping):
         parts = cast("Mapping[str, Any]", observation)
         return [array for name in sorted(parts) for array in _arrays(parts[name])]

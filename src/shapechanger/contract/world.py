@@ -1,4 +1,4 @@
-"""Interface of every world, and the quantities that sensors in it measure."""
+"""Interface of simulated worlds, and the quantities that sensors measure in them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RESTING_V: Final = 8.0
 """Voltage without load of two nearly full lithium cells."""
 
 STANDING_MPS: Final = 0.1
-"""Speed, m/s, below which a vehicle stands, unless it turns."""
+"""Speed, m/s, below which a vehicle that does not turn counts as standing."""
 
 STANDING_RADPS: Final = 0.1
-"""Rate of turn, rad/s, below which it does not turn."""
+"""Rate of turn, rad/s, below which a vehicle counts as not turning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +41,13 @@ class Readings:
     Attributes:
         pose: Pose of the vehicle.
         speed: Speed along its heading, m/s; backward is negative.
-        travelled_m: Distance that the wheels rolled; backward counts down.
+        travelled_m: Distance that the wheels have rolled, m; it decreases while rolling backward.
         acceleration_x: Acceleration along its heading, m/s2.
         acceleration_y: Acceleration to its left, m/s2.
         yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
         bumped: Whether the front bumper is pressed.
-        battery_v: Voltage of the battery under load.
-        current_a: Current from the battery.
+        battery_v: Voltage of the battery under load, V.
+        current_a: Current from the battery, A.
     """
 
     pose: Pose
@@ -73,15 +73,15 @@ class World(Protocol):
     """
 
     def lay_out(self, seed: int) -> None:
-        """Change the surroundings, and put the vehicle at a start in them."""
+        """Draw the surroundings, and put the vehicle at a start."""
         self.place(seed)
 
     def truth(self) -> dict[str, float]:
-        """Ground truth for evaluation, which no sensor measures, keyed by name; may be empty."""
+        """Return ground truth for evaluation that sensors do not measure, keyed by name."""
         ...
 
     def place(self, seed: int) -> None:
-        """Put the vehicle at a start, at rest."""
+        """Put the vehicle at rest at a start that `seed` draws."""
         ...
 
     def put_back(self) -> None:
@@ -89,7 +89,7 @@ class World(Protocol):
         self.place(0)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Simulate for a time.
+        """Simulate the world for a duration.
 
         Args:
             dt_s: Duration, s.
@@ -99,13 +99,13 @@ class World(Protocol):
         ...
 
     def inputs(self) -> Readings:
-        """Quantities that sensors measure."""
+        """Return the true values of quantities that sensors measure."""
         return Readings(Pose(0.0, 0.0, 0.0), battery_v=RESTING_V)
 
     def distance_m(self) -> float:
-        """Distance from the vehicle's nose to the nearest object ahead, m."""
+        """Return the distance from the vehicle's nose to the nearest object ahead, m."""
         return 0.0
 
     def picture(self) -> NDArray[np.uint8]:
-        """Image of the front camera, RGB, shape (height, width, 3)."""
+        """Return the image of the front camera, RGB, shape (height, width, 3)."""
         return np.zeros((120, 160, 3), np.uint8)

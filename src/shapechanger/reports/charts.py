@@ -1,4 +1,4 @@
-"""Style and rendering of charts as SVG text, byte for byte the same for the same numbers."""
+"""Style and rendering of charts as SVG text; equal numbers give equal bytes."""
 
 # Matplotlib's stubs leave the type of its keyword arguments open.
 # pyright: reportUnknownMemberType=false
@@ -18,8 +18,8 @@ try:
 except ImportError as error:
     raise MissingExtra("matplotlib", "report") from error
 
-# Okabe & Ito (2008), distinguishable with any colour vision; the green is darker than theirs, so
-# that a thin line of it is visible on white. Purple, the dark yellow and grey are additions.
+# Palette of Okabe & Ito (2008), distinguishable with any colour vision. The green is darker than in
+# the palette, so that thin lines are visible on white. Purple, dark yellow and grey are additions.
 BLUE: Final = "#0072B2"
 ORANGE: Final = "#D55E00"
 GREEN: Final = "#007A5A"
@@ -32,7 +32,7 @@ GREY: Final = "#555555"
 
 _STYLE: Final = {
     "font.size": 10.0,
-    "font.family": "DejaVu Sans",  # Ships with matplotlib, so that all machines draw the same.
+    "font.family": "DejaVu Sans",  # Ships with matplotlib, so charts do not depend on the machine.
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -43,7 +43,7 @@ _STYLE: Final = {
 }
 _NO_METADATA: Final = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
-# Two panels fit side by side on a page and one on a phone, at legible sizes. Inches.
+# Sizes of charts, inches. Two panels fit next to each other on a page, and one fits on a phone.
 PANEL: Final = (4.7, 4.1)
 LOW_PANEL: Final = (4.7, 2.6)
 SQUARE: Final = (4.4, 4.0)

@@ -17,7 +17,7 @@ except ImportError as error:
 
 _WEBM: Final = ".webm"
 _FILMS: Final = (".avi", ".gif", ".mkv", ".mov", ".mp4", _WEBM)
-# Constant quality rather than a bit rate, and a speed at which encoding takes as long as rendering.
+# Constant quality, and a speed setting at which encoding takes as long as rendering.
 _VP9: Final = {
     "codec": "libvpx-vp9",
     "output_params": ["-crf", "36", "-b:v", "0", "-cpu-used", "3", "-row-mt", "1"],

@@ -1,4 +1,4 @@
-"""Formatting of numbers: as many digits as the interval supports, and no -0."""
+"""Formatting of numbers, with a number of digits that suits their interval, and without -0."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _Name = TypeVar("_Name", bound=str)
 UNDEFINED: Final = "undefined"
 CONFIDENCE: Final = 0.95
 
-# Above this, thousands separators make a number longer than scientific notation does.
+# Size from which numbers are shorter in scientific notation than with thousands separators.
 _HUGE: Final = 1e10
 _MAX_DECIMALS: Final = 6
 # Significant digits of a number without an interval; an interval gets two digits of its width.
@@ -22,7 +22,7 @@ _SIGNIFICANT: Final = 4
 
 
 def number(value: float, decimals: int | None = None, *, signed: bool = False) -> str:
-    """Format a number with thousands separators, or in scientific notation where it is huge."""
+    """Format a number with thousands separators, or in scientific notation from 1e10."""
     sign = "+" if signed and value > 0.0 else ""
     if abs(value) >= _HUGE:
         mantissa, exponent = f"{value:.3e}".split("e")
@@ -45,8 +45,8 @@ def interval_text(
 
     Args:
         value: The estimate; None if it is undefined.
-        low: Lower end of the interval; None without one.
-        high: Upper end of the interval; None without one.
+        low: Lower end of the interval; None if there is no interval.
+        high: Upper end of the interval; None if there is no interval.
         signed: Whether numbers above zero get a plus sign.
     """
     if value is None:
@@ -64,7 +64,7 @@ def interval_text(
 
 
 def list_text(values: Sequence[float]) -> str:
-    """Format several numbers with the same decimals, enough to tell them apart."""
+    """Format several numbers with the same decimals, enough to distinguish them."""
     decimals = _decimals(max(values) - min(values), 3)
     return "; ".join(number(value, decimals) for value in values)
 
@@ -143,7 +143,7 @@ def share_text(shares: NDArray[np.float64]) -> str:
     The interval is clipped to 0 and 1.
 
     Args:
-        shares: 0 to 1, shape (n_seeds,); empty for an empty text.
+        shares: Share of each seed, 0 to 1, shape (n_seeds,); if empty, the text is empty.
     """
     if shares.size == 0:
         return ""
@@ -159,7 +159,7 @@ def _percent(share: float) -> str:
 
 
 def _decimals(size: float, significant: int) -> int:
-    """Digits after the point that show so many significant digits of `size`."""
+    """Return the decimals that show `significant` significant digits of `size`."""
     if size == 0.0:
         return 0
     return min(max(significant - 1 - math.floor(math.log10(size)), 0), _MAX_DECIMALS)

@@ -21,7 +21,7 @@ _TEMPLATES: Final = Path(__file__).parent / "templates"
 
 
 def render(template: str | Path, **values: Any) -> str:
-    """Render a page from a template, which may use those in `shapechanger/reports/templates`.
+    """Render a page from a template, which may import from `shapechanger/reports/templates`.
 
     Values are escaped, except those of type `markupsafe.Markup`.
     """
@@ -55,7 +55,7 @@ def _environment(folder: Path) -> Environment:
 
 
 def png_uri(picture: NDArray[np.uint8]) -> str:
-    """Lossless data URI of an image, shape (height, width, 3)."""
+    """Return an image of shape (height, width, 3) as a lossless data URI."""
     from PIL import Image
 
     file = io.BytesIO()
@@ -64,12 +64,12 @@ def png_uri(picture: NDArray[np.uint8]) -> str:
 
 
 def jpeg_uri(jpeg: bytes) -> str:
-    """Data URI of a JPEG file."""
+    """Return a JPEG file as a data URI."""
     return _uri("image/jpeg", jpeg)
 
 
 def svg_uri(svg: str) -> str:
-    """Data URI of an SVG drawing; as a separate image, its ids cannot clash with another's."""
+    """Return an SVG drawing as a data URI, so that its ids cannot clash with other drawings."""
     return _uri("image/svg+xml", svg.encode())
 
 

@@ -186,7 +186,9 @@ def test_wrong_numbers_of_seeds_and_values_are_refused(ants: ThreadVectorEnv) ->
 def test_what_is_no_seed_is_refused(ants: ThreadVectorEnv, seed: Any) -> None:
     """Seeds are whole numbers from 0, and no more than a device holds in 64 bits."""
     before = ants.reset(seed=3)[0].copy()
-    with pytest.raises(VectorEnvError, match=r"A seed is a whole number from 0 to 92\d+, got "):
+    with pytest.raises(
+        VectorEnvError, match=r"A seed must be a whole number from 0 to 92\d+, got "
+    ):
         ants.reset(seed=seed)
     np.testing.assert_array_equal(ants.reset(seed=3)[0], before)
 

@@ -96,7 +96,7 @@ def test_a_seed_gives_the_same_world_anywhere() -> None:
     with pytest.raises(ValueError, match="3 envs and 2 seeds"):
         envs.reset(seed=[1, 2])
     envs.reset(seed=2**63 - 3)
-    with pytest.raises(ValueError, match=r"A seed is a whole number from 0 to 92\d+, got 922"):
+    with pytest.raises(ValueError, match=r"A seed must be a whole number from 0 to 92\d+, got 922"):
         envs.reset(seed=2**63)
 
 

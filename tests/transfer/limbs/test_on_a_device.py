@@ -96,7 +96,7 @@ def test_what_the_adapter_promises() -> None:
 def test_what_it_refuses() -> None:
     """Callbacks and budgets below one evaluation, which other learners take."""
     learner = RslLearner("rsl-ppo", SETTINGS)
-    with pytest.raises(StudyError, match="takes no callback"):
+    with pytest.raises(StudyError, match="cannot use callbacks"):
         learner.train(PENDULUM, 2048, 0, callback=object(), on_evaluation=print)
     with pytest.raises(StudyError, match="is too small"):
         learner.train(PENDULUM, 512, 0, on_evaluation=print)

@@ -116,9 +116,7 @@ def test_zero_shot_has_a_start_and_an_end() -> None:
     assert jumpstart(ZERO_SHOT, SCRATCH).value == pytest.approx(0.45)
     end = asymptotic_gain(ZERO_SHOT, SCRATCH, last_k=2)
     assert end.value == pytest.approx(0.55 - 0.6)
-    assert (
-        end.note == "The arm is not trained on the target: its one evaluation stands for its end."
-    )
+    assert end.note == "The arm is not trained on the target: its one evaluation counts as its end."
     assert end.method == "Welch's t"
 
 

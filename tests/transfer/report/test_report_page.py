@@ -93,7 +93,7 @@ def test_provenance_and_methods_are_stated(page: str) -> None:
         "Taylor & Stone, JMLR 10, 2009",
         "Continual World, NeurIPS 2021",
         "(value - zero) / (one - zero)",
-        "zero = 10 is the most that takes no skill, here random actions",
+        "zero = 10 is the best value without skill, here random actions",
         "ppo-balance",
         "learning_rate 0.001",
         "shapechanger transfer Ant BigAnt --seeds 5",

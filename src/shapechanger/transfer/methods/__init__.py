@@ -1,9 +1,9 @@
 """Transfer methods: how the arms of a study use the source.
 
-A method is a small class with a name, in one file. Naming one imports only that one. Others than
-those that come with Shapechanger are found in three ways: by `register` in a module that is already
-imported, by an entry point of the group `shapechanger.methods`, or by a name such as
-`my_package:warm-start`, which imports `my_package` first, as Gymnasium's ids do.
+A method is a small class with a name, in one file, which is imported only if the method is used.
+Other packages add methods in three ways: by `register` in a module that is already imported, by an
+entry point of the group `shapechanger.methods`, or by a name such as `my_package:warm-start`, which
+imports `my_package` first, as ids of Gymnasium do.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class MethodRun:
-    """One run of a method: the bodies, the budget, and how to train and to evaluate.
+    """One run of a method: the envs, the budget, and functions to train and to evaluate.
 
     Attributes:
         source: The source env.
         target: The target env.
-        body_map: Map between their layouts.
+        body_map: Map between the layouts of source and target.
         learner: The learner.
-        steps: Target steps that may be used, a multiple of an update.
-        source_steps: Source steps that a policy of the method's own may be trained for.
-        seed: Seed of the run; everything random follows from it.
-        folder: Folder of the run, for files of the method's own.
-        source_file: File of the source policy of this run's seed, or of the given one.
+        steps: Target steps that may be used, a multiple of the steps of an update.
+        source_steps: Source steps of a policy that the method trains itself.
+        seed: Seed of the run, from which all random numbers must derive.
+        folder: Folder of the run, for files of the method.
+        source_file: File of the source policy of this run's seed, or of the given source policy.
         policy_file: File of the policy of this run.
         shared: Returns the shared file of a kind of run: "source" or "scratch".
         kind: The kind of the run.
-        identity: Version of the method, if it is the user's own, for the card of its policy.
+        identity: Identity of a custom method, for the card of its policy; empty for shipped ones.
         report: Records an evaluation on the target. Evaluations of a method that learns on the
             target are at the same steps as the evaluations of scratch.
         on_steps: Called with the number of steps done in all trainings of this run.
@@ -87,15 +87,15 @@ class MethodRun:
 
         Args:
             env: The env to train in.
-            steps: Its steps.
+            steps: Steps of the training.
             start: A policy of another body to start from; None for a new one.
-            body_map: Map from that body to the body of `env`.
+            body_map: Map from the body of `start` to the body of `env`.
             on_evaluation: Called with each evaluation in `env`.
             **more: Arguments of learners that the method `needs`, such as `callback`.
         """
         before = self._done
         if "demonstrations" in self.settings.takes:
-            # All arms share the demonstrations of a target: they differ only in where they start.
+            # All arms share the demonstrations of a target and differ only in their first policy.
             shared = self.shared("scratch" if env == self.target else self.kind)
             more |= {"demonstrations": shared, "only_last": env != self.target}
         policy = self.learner.train(
@@ -116,8 +116,8 @@ class MethodRun:
 
         Args:
             start: The policy; None for the source policy of this run's seed.
-            body_map: Map from its body to the target's; None for the study's.
-            **more: As of `train`.
+            body_map: Map from the policy's body to the target; None for the study's map.
+            **more: Other arguments of `train`.
         """
         return self.train(
             self.target,
@@ -129,16 +129,16 @@ class MethodRun:
         )
 
     def saved_policy(self) -> Any:
-        """Load the policy that an earlier attempt of this run has saved; None without one."""
+        """Load the policy that an earlier attempt of this run saved; None if there is no file."""
         return self.learner.load(self.policy_file) if self.policy_file.exists() else None
 
     def save(self, policy: Any) -> None:
-        """Save the policy of this run, so that a failure from here on does not cost its training.
+        """Save the policy of this run, so that a later failure does not lose its training.
 
         Args:
             policy: The policy.
         """
-        if self.identity and hasattr(policy, "carded"):  # Only policies with a card have a version.
+        if self.identity and hasattr(policy, "carded"):  # The identity is stored in the card.
             policy = policy.carded(identity={**policy.card.identity, **self.identity})
         policy.save(self.policy_file)
 
@@ -147,7 +147,7 @@ class MethodRun:
 
         Args:
             policy: The policy.
-            body_map: Map from its body to the target's; the study's if not given.
+            body_map: Map from the policy's body to the target; None for the study's map.
         """
         return self.learner.evaluate(self.target, policy, body_map or self.body_map)
 
@@ -156,13 +156,13 @@ class Method:
     """A transfer method; subclass it and `register` the subclass.
 
     Attributes:
-        name: Its name, as in `--arms`.
-        paper: The publication that describes it.
-        uses_source_policy: Whether it starts from the source policy that the study trains.
-        uses_source: Whether it has cost source steps, which count in total steps.
-        trains: Whether it trains a policy, which `learn` returns.
-        learns_on_target: Whether it learns on the target, so that it has a learning curve there.
-        needs: What the learner must have in `takes`, each with a description of such a learner.
+        name: Name of the method, as in `--arms`.
+        paper: The publication that describes the method.
+        uses_source_policy: Whether the method starts from the source policy of the study.
+        uses_source: Whether the method needs source steps, which count in total steps.
+        trains: Whether the method trains a policy, which `learn` returns.
+        learns_on_target: Whether the method trains on the target and has a learning curve there.
+        needs: Required entries of the learner's `takes`, each with a description of such learners.
         one_family: Whether source and target must be bodies of one family.
     """
 
@@ -176,7 +176,7 @@ class Method:
     one_family: ClassVar[bool] = False
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Refuse a study that the method cannot be an arm of.
+        """Refuse a study in which the method cannot be an arm.
 
         Args:
             source: Traits of the source.
@@ -184,7 +184,7 @@ class Method:
             settings: Settings of the learner.
 
         Raises:
-            StudyError: With the reason.
+            StudyError: If the method cannot be an arm.
         """
         for takes, text in self.needs:
             if takes not in settings.takes:
@@ -196,7 +196,7 @@ class Method:
         return StudyError(f"{self.name} needs {needed}: leave this arm out.")
 
     def learn(self, run: MethodRun) -> Any:
-        """Run the method once, and return its policy; None if it trains none.
+        """Run the method once, and return its policy; None if the method does not train.
 
         Args:
             run: The run.

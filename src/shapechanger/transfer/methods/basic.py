@@ -1,4 +1,4 @@
-"""Methods that need no more of the learner than its interface, such as fine-tuning."""
+"""Methods that work with every learner, or only need its interface, such as fine-tuning."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ class FineTune(Method):
 class Rehearsal(Method):
     """Fine-tune on batches that mix the target's demonstrations with the source's.
 
-    A few seconds of a target show little of its world, and a clone that learns from them alone
-    forgets the rest. The share of the source in each batch is `rehearsal` of the learner's
-    `CloneSettings`.
+    A few seconds of demonstrations show little of a target, and a clone that is trained on them
+    alone forgets other situations. The share of the source in each batch is `rehearsal` of the
+    learner's `CloneSettings`.
     """
 
     name = "rehearsal"
@@ -69,15 +69,15 @@ class Rehearsal(Method):
     paper = "A. Robins, Catastrophic Forgetting, Rehearsal and Pseudorehearsal, Conn. Sci., 1995"
 
     def learn(self, run: MethodRun) -> Any:
-        """Train on both, starting from the source policy."""
+        """Train on demonstrations of source and target, starting from the source policy."""
         rehearsed = (run.source, run.source_steps, run.shared("source"))
         return run.fine_tune(rehearsed=rehearsed)
 
 
 class ShuffledMap(Method):
-    """Fine-tune through a body map with exchanged entries: a control of what the map contributes.
+    """Fine-tune through a body map with exchanged entries, to measure the map's contribution.
 
-    A gain that remains does not depend on which inputs and outputs correspond.
+    If this arm still gains over scratch, the gain does not depend on a correct map.
     """
 
     name = "shuffled-map"
@@ -88,7 +88,7 @@ class ShuffledMap(Method):
 
 
 def shuffle(body_map: BodyMap, rng: np.random.Generator) -> BodyMap:
-    """Return a body map with the same rules, each at another entry."""
+    """Return a body map with the same rules, assigned to the entries in random order."""
     return msgspec.structs.replace(
         body_map,
         observation=_shuffled(body_map.observation, body_map.source_observation, rng),
@@ -99,7 +99,7 @@ def shuffle(body_map: BodyMap, rng: np.random.Generator) -> BodyMap:
 def _shuffled(
     entries: Sequence[MapEntry], layout: Layout, rng: np.random.Generator
 ) -> tuple[MapEntry, ...]:
-    """Exchange the rules that copy features of the same shape; the others stay."""
+    """Exchange the copies of features of the same shape at random; other rules stay in place."""
     places: dict[tuple[int, ...], list[int]] = {}
     for i, entry in enumerate(entries):
         if isinstance(entry.rule, Copy):
@@ -113,14 +113,13 @@ def _shuffled(
 
 
 BODIES: Final = 32
-"""Bodies that the policy learns in before the target."""
+"""Number of bodies that the policy is trained in before the target."""
 
 
 class Generalist(Method):
-    """Learn in bodies drawn from the source's family, then in the target with the same weights.
+    """Train in bodies drawn from the source's family, then in the target with the same weights.
 
-    The evaluation before the first target step shows the generalist in a body that it has
-    never had.
+    The evaluation before the first target step shows the policy in a body that is new to it.
     """
 
     name = "generalist"
@@ -135,16 +134,16 @@ class Generalist(Method):
         return run.fine_tune(start=run.train(many, run.source_steps))
 
 
-# Share of the target steps that is spent on the bodies in between.
+# Share of the target steps that are spent on bodies between source and target.
 _ON_THE_WAY: Final = 0.5
 
 
 class Evolution(Method):
     """Fine-tune on one body after another, each a little more like the target.
 
-    Half of the target steps are spent on bodies between source and target, one for each evaluation
-    of the learning curve, and count as target steps. REvolveR chooses the next body by how well the
-    policy does; here the steps are equal.
+    Half of the target steps are spent on bodies between source and target, one body for each
+    evaluation of the learning curve. REvolveR chooses the next body by the policy's performance;
+    here the bodies are at equal distances.
     """
 
     name = "evolution"
@@ -153,7 +152,7 @@ class Evolution(Method):
     one_family = True
 
     def learn(self, run: MethodRun) -> Any:
-        """Train along the path, and then on the target."""
+        """Train on the bodies between source and target, and then on the target."""
         stage = run.settings.whole_updates(run.settings.eval_every)
         n_stages = int(_ON_THE_WAY * run.steps) // stage
         path = bodies_between(run.source, run.target, n_stages)
@@ -176,19 +175,19 @@ class Evolution(Method):
 
 
 def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
-    """Return envs whose bodies lie at equal distances between two others."""
+    """Return envs with bodies at equal distances between two bodies of one family."""
     with closing(source.make()) as first, closing(target.make()) as last:
         start: Any = first.unwrapped
         end: Any = last.unwrapped
         families = {getattr(body, "family_name", "") for body in (start, end)}
         if len(families) > 1 or "" in families:
-            raise StudyError(f"{source} and {target} are not of one family of bodies.")
+            raise StudyError(f"{source} and {target} must be bodies of one family.")
         shares = (k / (count + 1) for k in range(1, count + 1))
         return [target.having(start.arguments_towards(end, share)) for share in shares]
 
 
 def _map_between(one: EnvRef, other: EnvRef, run: MethodRun) -> BodyMap:
-    """The study's map if the layouts change as from source to target, else a map by names."""
+    """Return the study's map if it fits both envs, else a map that matches names."""
     with closing(one.make()) as before, closing(other.make()) as after:
         (seen, acted), (sees, acts) = layouts_of(before), layouts_of(after)
     if (seen, acted) == (sees, acts):
@@ -199,7 +198,7 @@ def _map_between(one: EnvRef, other: EnvRef, run: MethodRun) -> BodyMap:
 
 
 class AdaptedSource(Method):
-    """Train in a source adapted to the target; base class of the two below."""
+    """Train in a source that is adapted to the target; base class of two methods."""
 
     uses_source_policy = False
     learns_on_target = False
@@ -207,7 +206,7 @@ class AdaptedSource(Method):
     def learn(self, run: MethodRun) -> Any:
         """Adapt the source, train in it, and evaluate on the target.
 
-        A rig may fail in the evaluation; the repeated run evaluates the policy that was trained.
+        If a robot fails in the evaluation, the repeated run evaluates the saved policy.
         """
         policy = run.saved_policy()
         if policy is None:
@@ -228,15 +227,15 @@ class AdaptedSource(Method):
 class Randomised(AdaptedSource):
     """Learn in a source whose body is drawn again for each episode.
 
-    A target may state the plausible range of its body, such as a finger. Otherwise, in a family of
-    bodies, each body lies between the source and the target, both included.
+    A target such as a finger states the plausible range of its body. Otherwise each body lies
+    between the source and the target, both included.
     """
 
     name = "randomised"
     paper = "X. B. Peng and others, Sim-to-Real Transfer with Dynamics Randomization, ICRA 2018"
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Require two bodies of one family and space, or a target that states its range."""
+        """Require bodies of one family with equal layouts, or a target that states its range."""
         del settings
         same_family = source.family and source.family == target.family
         if target.adapts_source or (same_family and source.same_layouts(target)):

@@ -31,10 +31,10 @@ _PPO = f"PPO with at least {_LEAST_LAYERS} hidden layers"
 
 
 class FrozenTrunk(Method):
-    """Fine-tune the first and the last layer of the policy, and keep those between.
+    """Fine-tune the first and the last layer of the policy, and freeze the layers between.
 
-    The first layer reads the body's sensors and the last one moves its motors; the layers between
-    hold the skill, as far as it is independent of the body. The whole value network learns.
+    The first layer depends on the body's sensors and the last one on its motors; the layers between
+    depend less on the body. The whole value network is trained.
     """
 
     name = "frozen-trunk"
@@ -42,7 +42,7 @@ class FrozenTrunk(Method):
     paper = "C. Devin and others, Learning Modular Neural Network Policies, ICRA 2017"
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Refuse learners without what it needs, and networks without a layer in the middle."""
+        """Refuse learners that the method cannot use, and networks with one hidden layer."""
         super().require(source, target, settings)
         if len(cast("Any", settings).net_arch) < _LEAST_LAYERS:
             raise self._lacks(_PPO)
@@ -53,7 +53,7 @@ class FrozenTrunk(Method):
 
 
 class _AtStart(BaseCallback):
-    """Base class of callbacks that act before the first step only."""
+    """Base class of callbacks that only have an effect before the first step."""
 
     def _on_step(self) -> bool:
         return True
@@ -79,8 +79,8 @@ class Kickstart(Method):
 
     After each update of PPO, one pass over the same observations minimises the divergence from the
     source policy's actions through the body map. Its weight falls linearly to 0 over the first half
-    of the steps. The paper adds the two losses; here their steps alternate, so that PPO is the one
-    of Stable-Baselines3. Actions that the map leaves to be learned are not distilled.
+    of the steps. The paper adds the two losses. Here updates by the two losses alternate, so that
+    PPO of Stable-Baselines3 is unchanged. Actions with the rule `learn` are not distilled.
     """
 
     name = "kickstart"
@@ -115,7 +115,7 @@ class MappedTeacher:
 
 
 class _Distillation(BaseCallback):
-    """Collects the teacher's actions during a rollout, and learns from them after the update."""
+    """Collects the teacher's actions during a rollout, and distils them after PPO's update."""
 
     def __init__(self, teacher: MappedTeacher, action: Layout) -> None:
         super().__init__()
@@ -123,18 +123,18 @@ class _Distillation(BaseCallback):
         self._action = action
         self._seen: list[NDArray[Any]] = []
         self._shown: list[NDArray[np.float32]] = []
-        # The teacher's answer to the observations that the next step acts on.
+        # The teacher's actions for the present observations, which belong to the next step.
         self._next = np.empty(0, np.float32)
 
     def _on_rollout_start(self) -> None:
-        # PPO has just updated on the last rollout, if there was one.
+        # At the first rollout there is no earlier rollout to distil.
         if self._seen:
             self._distil(np.concatenate(self._seen), np.concatenate(self._shown))
         self._seen, self._shown = [], []
         self._next = self._teacher(self._raw_observations())
 
     def _on_step(self) -> bool:
-        # The observations that this step's actions answered, as the network has seen them.
+        # The network's inputs of this step, with normalisation.
         self._seen.append(self.locals["obs_tensor"].numpy().copy())
         self._shown.append(self._next)
         self._next = self._teacher(self._raw_observations())
@@ -162,7 +162,7 @@ class _Distillation(BaseCallback):
         for start in range(0, len(seen), model.batch_size):
             batch = slice(start, start + model.batch_size)
             normal = policy.get_distribution(observations[batch]).distribution
-            # The divergence of two Gaussians of this policy's deviation, which PPO alone changes.
+            # The divergence of two Gaussians with the policy's deviation, which only PPO trains.
             away = (normal.mean - actions[batch]) / normal.stddev.detach()
             loss = 0.5 * away[:, taught].square().sum(dim=1).mean()
             policy.optimizer.zero_grad()
@@ -175,8 +175,8 @@ class _Distillation(BaseCallback):
 
 # Number of prefilled source transitions, as a share of the target steps.
 _PREFILLED: Final = 0.5
-# The classifiers have one hidden layer and noisy inputs, as in the paper; these numbers (width,
-# standard deviation of the noise, batch) are ours and were not tuned.
+# The classifiers have one hidden layer and noisy inputs, as in the paper. Width, standard deviation
+# of the noise and size of a batch are not from the paper and were not tuned.
 _WIDTH: Final = 256
 _NOISE: Final = 0.1
 _BATCH: Final = 256
@@ -209,8 +209,8 @@ class PrefilledReplay(Method):
     """Learn the target with a new policy whose replay buffer starts with mapped source transitions.
 
     The source policy acts in the source with its exploration noise for half as many steps as there
-    are target steps. Observations are mapped by the names of the two bodies, actions by the study's
-    body map, rewards stay. They are not marked as observations of another body.
+    are target steps. Observations are mapped by matching names, and actions by the study's body
+    map. Rewards are unchanged. The learner cannot distinguish these transitions from its own.
     """
 
     name = "prefilled-replay"
@@ -230,13 +230,13 @@ class PrefilledReplay(Method):
 
 
 class OffDynamics(Method):
-    """Learn in the source, with rewards corrected for how the target's dynamics differ (DARC).
+    """Learn in the source, with rewards corrected for the target's dynamics (DARC).
 
-    Two classifiers tell source from target, one by (s, a, s') and one by (s, a). Their difference
-    estimates log p_target(s' | s, a) - log p_source(s' | s, a), which is added to the source's
-    reward, so that transitions which only the source's body can make are penalised. The policy
-    learns from source steps alone, as many as a source policy has; it also acts on the target for
-    the budget of target steps, from which only the classifiers learn.
+    Two classifiers distinguish source from target, one by (s, a, s') and one by (s, a). Their
+    difference estimates log p_target(s' | s, a) - log p_source(s' | s, a), which is added to the
+    source's reward. So transitions that are unlikely on the target are penalised. The policy is
+    trained on source steps only, as many as a source policy has. It also acts on the target for the
+    budget of target steps, which only train the classifiers.
     """
 
     name = "off-dynamics"
@@ -245,7 +245,7 @@ class OffDynamics(Method):
     uses_source_policy = False
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Refuse learners without a replay buffer, or that normalise, and bodies of two spaces."""
+        """Refuse learners without a replay buffer or with normalisation, and unequal layouts."""
         super().require(source, target, settings)
         if not source.same_layouts(target):
             raise self._lacks("two bodies with the same spaces")
@@ -262,7 +262,7 @@ class OffDynamics(Method):
 
 
 def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transitions:
-    """Let a policy act in an env with its exploration noise."""
+    """Return the transitions of a policy that acts in an env with its exploration noise."""
     act = actor(policy.model, policy.normalisation, policy.card.layouts[1], deterministic=False)
     rows: list[tuple[Any, ...]] = []
     with closing(env.make()) as made:
@@ -280,7 +280,7 @@ def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transi
 
 
 def _mapped(seen: Transitions, body_map: BodyMap) -> Transitions:
-    """Transitions of the source as the target's, by the names of the two bodies."""
+    """Return transitions of the source as transitions of the target."""
     observation, sees, action, acts = body_map.layouts
     onto_target = BodyMap.between(sees, observation, acts, action)
     return seen._replace(
@@ -347,10 +347,10 @@ class DomainClassifiers(nn.Module):
 
         Args:
             source: (s, a, s') of the source, each of shape (n, ...).
-            target: (s, a, s') of the target, as many.
+            target: (s, a, s') of the target, with the same shapes.
         """
         inputs = [torch.cat(pair) for pair in zip(source, target, strict=True)]
-        # Noise keeps classifiers of nearly deterministic dynamics from being sure.
+        # Noise prevents overconfident classifiers if the dynamics are nearly deterministic.
         noisy = [one + _NOISE * torch.randn_like(one) for one in inputs]
         labels = torch.cat([torch.zeros(len(source[0])), torch.ones(len(target[0]))])
         loss = torch.stack(
@@ -435,7 +435,7 @@ class _Correction(BaseCallback):
         self._seen = self._env.reset()[0] if terminated or truncated else then
 
     def _evaluate_if_due(self, *, last: bool = False) -> None:
-        """Evaluate on the target, at the steps at which scratch is."""
+        """Evaluate on the target, at the same steps as scratch."""
         run = self._run
         if not last and self._steps < self._next:
             return

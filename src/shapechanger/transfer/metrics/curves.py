@@ -1,7 +1,7 @@
 """Learning curves and scores.
 
-A curve is linear between two evaluations. Every measure uses that, so areas, crossings and values
-between evaluations are consistent. A score of 0 means no skill, and 1 is the target's reference.
+Every measure interpolates a curve linearly between evaluations, so areas, crossings and values are
+consistent. A score of 0 means no skill, and 1 is the target's reference.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import StudyError
 
-# Larger numbers are overflows, and the statistics would overflow too.
+# Larger numbers would overflow in the statistics.
 _LARGEST_RETURN: Final = 1e30
 
 
@@ -34,8 +34,8 @@ class LearningCurves:
         returns: Mean undiscounted return of each seed at each evaluation, shape (n_seeds, n_evals),
             finite; in units of return, or of score after `Reference.scores`.
         source_steps: Environment steps of the source that count before the first evaluation: the
-            curves at step T are `returns` at T - source_steps. 0 where only target steps count. Set
-            it with `in_total_steps`.
+            curves at step T are `returns` at T - source_steps. 0 if only target steps count;
+            `in_total_steps` sets it.
         floor: Value of the curves until `source_steps` have passed, in units of `returns`.
 
     Raises:
@@ -89,7 +89,7 @@ class LearningCurves:
         the last evaluation after that.
 
         Args:
-            steps: Steps, counted as these curves count them, shape (n_steps,), >= 0.
+            steps: Steps, including `source_steps`, shape (n_steps,), >= 0.
         """
         learning = np.atleast_1d(np.asarray(steps, dtype=np.float64)) - self.source_steps
         return np.where(learning < 0.0, self.floor, self._after_training(learning))
@@ -97,12 +97,11 @@ class LearningCurves:
     def auc(self) -> NDArray[np.float64]:
         """Area under each curve from 0 to H, divided by H, shape (n_seeds,).
 
-        The division makes it the mean height of the curve, in units of `returns`. The area before
-        the jump at `source_steps` is a rectangle and the area after it a trapezoid rule on the
-        evaluations that still fit; the jump itself is never interpolated over.
+        The result is the mean height of the curve, in units of `returns`. The area before the jump
+        at `source_steps` is a rectangle. The area after the jump is a trapezoidal sum up to H.
 
         Raises:
-            StudyError: If the arm was evaluated once only, which spans no area.
+            StudyError: If the arm was evaluated only once.
         """
         if self.n_evals == 1:
             raise StudyError("One evaluation spans no area; a learning curve needs at least two.")
@@ -119,7 +118,7 @@ class LearningCurves:
 
 
 def in_total_steps(curves: LearningCurves, source_steps: float, floor: float) -> LearningCurves:
-    """The same runs with the steps they spent on the source counted too.
+    """Return the same curves with the steps on the source counted too.
 
     Taylor & Stone (JMLR 10, 2009, section 2) call this the total time scenario. The budget stays
     H = `curves.horizon`: with S steps on the source, H - S are left for the target.
@@ -135,7 +134,7 @@ def in_total_steps(curves: LearningCurves, source_steps: float, floor: float) ->
         Curves on the same grid of evaluations.
 
     Raises:
-        StudyError: If the source steps are counted already, or are not a count.
+        StudyError: If the source steps are already counted, or are negative or not finite.
     """
     if curves.source_steps > 0.0:
         raise StudyError(f"The curves already count {curves.source_steps:g} source steps.")
@@ -171,20 +170,20 @@ class Reference(msgspec.Struct, frozen=True):
 
     score = (J - zero) / (one - zero)
 
-    The formula follows D4RL (arXiv 2004.07219). Zero is the score without skill: an ant that stands
-    still earns 1,000, so the random policy alone would be too low a floor. Both ends belong to the
-    target, because an expert on the source is not comparable on another body. The reference is
-    taken as given: intervals of scores do not include its uncertainty.
+    The formula follows D4RL (arXiv 2004.07219). `zero` is the best value without skill: an ant that
+    stands still earns 1,000, so random actions alone would be too low. Both values are measured on
+    the target, because an expert on the source is not comparable on another body. Intervals of
+    scores do not include the uncertainty of the reference.
 
     Attributes:
         zero: Value without skill.
         one: Value of the target's reference, or at the end of the best arm if it has no reference.
         zero_of: Name of the policy with the value zero, such as "random actions".
         one_of: Name of the reference or the arm with the value one.
-        shipped: Whether one is the value of a reference that ships.
+        shipped: Whether `one` is the value of a reference that ships with Shapechanger.
 
     Raises:
-        StudyError: If one of them is not finite.
+        StudyError: If one of the values is not finite.
     """
 
     zero: float
@@ -194,7 +193,7 @@ class Reference(msgspec.Struct, frozen=True):
     shipped: bool = False
 
     def __post_init__(self) -> None:
-        """Check that both are finite."""
+        """Check that both values are finite."""
         if not (math.isfinite(self.zero) and math.isfinite(self.one)):
             raise StudyError(f"A reference needs finite values, got {self.zero} and {self.one}.")
 
@@ -205,12 +204,12 @@ class Reference(msgspec.Struct, frozen=True):
         ends: Mapping[str, float],
         shipped: tuple[str, float] | None = None,
     ) -> Reference:
-        """Measure the reference of a target.
+        """Compute the reference of a target.
 
         Args:
             floors: Mean values of the policies without skill, keyed by name; at least one.
             ends: Mean values at the end of each arm, keyed by name; at least one.
-            shipped: Name and value of the target's own reference; None if it has none.
+            shipped: Name and value of the target's shipped reference; None without one.
         """
         zero_of, one_of = max(floors, key=floors.__getitem__), max(ends, key=ends.__getitem__)
         name, value = shipped or (one_of, ends[one_of])
@@ -227,8 +226,8 @@ class Reference(msgspec.Struct, frozen=True):
 
         Args:
             curves: Curves in units of return.
-            clip: Clip each evaluation to 0 and 1, as `forward_transfer` needs, whose formula takes
-                1 as the maximum. The other measures need unclipped scores, since a run can beat
+            clip: Clip each evaluation to 0 and 1, because 1 is the maximum in the formula of
+                `forward_transfer`. The other measures need unclipped scores, because a run can beat
                 the mean of the best arm.
 
         Raises:
@@ -236,7 +235,7 @@ class Reference(msgspec.Struct, frozen=True):
         """
         if not self.defined:
             raise StudyError(
-                f"The best arm ended at {self.one:g}, and {self.zero:g} takes no skill: no arm "
+                f"The best arm ended at {self.one:g}, and {self.zero:g} needs no skill: no arm "
                 "learned, so there are no scores. Compare values instead."
             )
         low, high = (0.0, 1.0) if clip else (-math.inf, math.inf)

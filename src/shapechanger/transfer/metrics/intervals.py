@@ -1,14 +1,14 @@
 """Estimates with confidence intervals: over the seeds of one study, and over several studies.
 
-Each arm is one sample of independent seeds; sizes may differ, and arms are not paired. All
-functions take one number for each seed. docs/statistics.md measures the coverage of such intervals
-with few seeds, and compares alternatives.
+Each arm is one sample of independent seeds. Sizes may differ, and arms are not paired. The
+arguments are one number for each seed. docs/statistics.md compares the coverage of these and other
+intervals with few seeds.
 
 Interquartile mean and probability of improvement follow R. Agarwal and others, "Deep Reinforcement
 Learning at the Edge of the Statistical Precipice", NeurIPS 2021. Their intervals are percentiles of
-a bootstrap that is stratified: it draws runs with replacement within each study, because runs are
-independent and studies are not a sample of anything. With few studies of few seeds they are too
-narrow.
+a stratified bootstrap: it draws runs with replacement within each study, because runs are
+independent and studies are not a random sample. These intervals are too narrow if there are few
+studies with few seeds.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ IntervalKind = Literal["Welch's t", "studentised bootstrap", "stratified bootstr
 CONFIDENCE: Final = 0.95
 """Confidence of the intervals of studies."""
 
-# Numbers that differ by a smaller share of their size are equal up to rounding.
+# Numbers with a smaller relative difference are equal up to rounding.
 _ROUNDING: Final = 1e-12
-# The square of a smaller spread, divided by another one, would underflow.
+# Quotients of squares of smaller spreads would underflow.
 _LEAST_SPREAD: Final = 1e-60
-# A quarter of the runs is left out at each end of an interquartile mean.
+# Share of the runs that an interquartile mean leaves out at each end.
 _TRIMMED: Final = 0.25
 _POOLED_RESAMPLES: Final = 2000
-_NO_TAILS: Final = "No interval: too many resamples have no ratio, or no spread to judge it by."
+_NO_TAILS: Final = "No interval: too many resamples have no ratio or no spread."
 
 
 class Estimate(msgspec.Struct, frozen=True):
@@ -67,13 +67,13 @@ def estimate_difference(arm: NDArray[np.float64], scratch: NDArray[np.float64]) 
     """Difference of means, arm minus scratch, with Welch's t-interval.
 
     difference ± t(0.95, df) · sqrt(s_arm² / n_arm + s_scratch² / n_scratch), with the
-    degrees of freedom of Welch (Biometrika 34, 1947) and Satterthwaite. The percentile bootstrap,
-    which rliable uses (Agarwal et al., NeurIPS 2021), is made for scores pooled over many tasks;
-    with the five seeds of one arm a 95 % interval of it covers about 87 %, and Welch's 95 %.
+    degrees of freedom of Welch (Biometrika 34, 1947) and Satterthwaite. The percentile bootstrap of
+    rliable (Agarwal et al., NeurIPS 2021) is made for scores pooled over many tasks. With five
+    seeds in each arm, its 95 % interval covers about 87 %, and Welch's 95 %.
 
     Args:
-        arm: One number for each seed, shape (n_arm,).
-        scratch: The same, shape (n_scratch,).
+        arm: One number for each seed of the arm, shape (n_arm,).
+        scratch: One number for each seed of scratch, shape (n_scratch,).
     """
     value = float(arm.mean() - scratch.mean())
     if no_interval := _why_no_interval(arm, scratch):
@@ -94,28 +94,27 @@ def estimate_ratio(
     rng: np.random.Generator,
     n_resamples: int = 10_000,
 ) -> Estimate:
-    """Ratio of means, arm over scratch, with its studentised bootstrap interval.
+    """Ratio of means, arm divided by scratch, with its studentised bootstrap interval.
 
-    The seeds of each arm are resampled apart, with replacement. Each resample b gives
+    The seeds of each arm are resampled separately, with replacement. Each resample b gives
     t_b = (ratio_b - ratio) / error_b, with the standard error of a ratio by the delta method, and
     the interval is from ratio - t(high) · error to ratio - t(low) · error, with the quantiles of
     all t_b instead of Student's (B. Efron and R. J. Tibshirani, "An Introduction to the
     Bootstrap", 1993, section 12.5).
 
-    A resample has no t_b if it drew equal seeds only, so that its error is zero, or if its mean of
-    scratch is below `least`. Dropping such resamples would make the interval too narrow, and so
-    would a lower bound on the error that is chosen too high. They count as infinite in both tails
-    instead. If they fill a tail, there is no interval, and the note states it; with two seeds in
-    each arm, a quarter of the resamples has no t_b.
+    A resample has no t_b if its error is zero, because all drawn seeds are equal, or if its mean of
+    scratch is below `least`. Without these resamples the interval would be too narrow, so they
+    count as infinite in both tails. If they fill a tail, there is no interval, and the note states
+    this. With two seeds in each arm, a quarter of the resamples has no t_b.
 
     Args:
         arm: One number for each seed, shape (n_arm,).
         scratch: The same, shape (n_scratch,).
-        least: Smallest mean of scratch that the ratio may be taken over, > 0.
-        too_small: Why the ratio is undefined below that; the note of the estimate.
+        least: Smallest mean of scratch for which the ratio is defined, > 0.
+        too_small: Note of the estimate if the mean of scratch is below `least`.
         rng: Draws the resamples.
-        n_resamples: Number of resamples: at least 40, one for each tail; thousands for an interval
-            that hardly depends on `rng`.
+        n_resamples: Number of resamples, at least 40, so that each tail has one; thousands for an
+            interval that hardly depends on `rng`.
     """
     if not scratch.mean() >= least:
         return undefined(too_small)
@@ -128,7 +127,7 @@ def estimate_ratio(
         ratios, errors = _ratio(arms, scratches)
         t = (ratios - ratio) / errors
     usable = (scratches.mean(axis=-1) >= least) & (_spread(arms) | _spread(scratches))
-    usable &= errors > 0.0  # An arm of zeros makes the error zero whatever scratch does.
+    usable &= errors > 0.0  # The error is also zero if all numbers of the arm are zero.
     tail = (1.0 - CONFIDENCE) / 2.0
     low = float(np.quantile(np.where(usable, t, -np.inf), tail, method="lower"))
     high = float(np.quantile(np.where(usable, t, np.inf), 1.0 - tail, method="higher"))
@@ -156,9 +155,9 @@ def _squared_error(sample: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _why_no_interval(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> str:
-    """Return why these samples have no interval; empty if they have one."""
+    """Return the reason why these samples have no interval; empty if they have one."""
     if min(arm.size, scratch.size) < 2:
-        return "No interval: it takes at least two seeds in each arm."
+        return "No interval: each arm needs at least two seeds."
     if not (_spread(arm) | _spread(scratch)):
         return "No interval: all seeds of each arm are equal, so their spread is unknown."
     return ""
@@ -174,13 +173,13 @@ def interquartile_mean(scores: _Groups, *, rng: np.random.Generator) -> Estimate
     """Mean of the middle half of all runs, in units of score.
 
     Args:
-        scores: For each study one number for each run, shape (n_runs,).
+        scores: One array for each study, with one number for each run, shape (n_runs,).
         rng: Draws the resamples.
 
     Raises:
         StudyError: If there are no runs.
     """
-    from scipy import stats  # It takes a second to load.
+    from scipy import stats  # Takes a second to load.
 
     _require_runs(scores)
     mean: Any = stats.trim_mean(np.concatenate(scores), _TRIMMED)
@@ -197,12 +196,12 @@ def probability_of_improvement(
     Equal runs count half (Mann & Whitney, 1947). 0.5 means no effect.
 
     Args:
-        arm: For each study one number for each run of the arm.
-        scratch: The same of scratch, in the same order of studies.
+        arm: One array for each study, with one number for each run of the arm.
+        scratch: One array for each study, in the same order, with one number for each scratch run.
         rng: Draws the resamples.
 
     Raises:
-        StudyError: If there are no runs, or not as many studies of both.
+        StudyError: If there are no runs, or `arm` and `scratch` have different lengths.
     """
     _require_runs(arm)
     _require_runs(scratch)
@@ -215,7 +214,7 @@ def probability_of_improvement(
 
 
 def _chance(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of the pairs along the last axes in which x is above y; equal ones count half."""
+    """Return the share of pairs (x, y) along the last axes with x > y; equal pairs count half."""
     return 0.5 + 0.5 * np.sign(x[:, :, None] - y[:, None, :]).mean(axis=(1, 2))
 
 

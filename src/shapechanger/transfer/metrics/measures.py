@@ -3,9 +3,9 @@
 Source of the five: M. E. Taylor and P. Stone, "Transfer Learning for Reinforcement Learning
 Domains: A Survey", JMLR 10 (2009) 1633-1685, section 2.
 
-p is the mean curve over seeds and H the horizon. Every function takes the arm in target steps or,
-through `in_total_steps`, in total steps, and raises a StudyError if the curves of the arm and of
-scratch cannot be compared. Positive differences mean that transfer helped.
+p is the mean curve over seeds and H the horizon. Curves of the arm are in target steps or, after
+`in_total_steps`, in total steps. Every function raises a StudyError if the arm and scratch cannot
+be compared. Positive differences mean that transfer helped.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from shapechanger.transfer.metrics.intervals import (
     undefined,
 )
 
-_NO_CURVE: Final = "Undefined: it needs a learning curve, and there is one evaluation only."
-_NOT_TRAINED: Final = "The arm is not trained on the target: its one evaluation stands for its end."
+_NO_CURVE: Final = "Undefined: it needs a learning curve, and there is only one evaluation."
+_NOT_TRAINED: Final = "The arm is not trained on the target: its one evaluation counts as its end."
 # An area of scores below this is zero up to rounding.
 _ZERO_AREA: Final = 1e-9
 
@@ -56,14 +56,14 @@ def jumpstart(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
 def asymptotic_gain(arm: LearningCurves, scratch: LearningCurves, *, last_k: int) -> Estimate:
     """Final advantage of the arm, in units of the curves.
 
-    Mean of p_arm over the last k evaluations minus the mean of p_scratch. In total steps the arm is
-    read at the same k steps, which include its source steps. The one evaluation of an arm that is
-    not trained on the target counts as its end, because the policy does not change.
+    Mean of p_arm over the last k evaluations minus the mean of p_scratch at the same steps. In
+    total steps, these include the arm's source steps. If an arm is not trained on the target, its
+    one evaluation counts as its end, because the policy does not change.
 
     Args:
         arm: Curves of the arm.
         scratch: Curves of the baseline, evaluated at the same steps.
-        last_k: k, number of final evaluations, >= 1. The definition uses one; more reduce noise.
+        last_k: k, number of final evaluations, >= 1. Taylor & Stone use one; more reduce noise.
 
     Raises:
         StudyError: If the curves cannot be compared or have fewer than k evaluations.
@@ -121,8 +121,8 @@ def auc_ratio(
     )
 
 
-# The measure divides by the headroom 1 - AUC_b: below one hundredth of the scale, a difference of
-# 0.01 in the areas, less than the variation between runs, would count as a transfer of 1.
+# Smallest headroom 1 - AUC_b, by which the measure divides. With less, a difference of 0.01 in the
+# areas, which is less than the variation between runs, would be a transfer of 1.
 MIN_HEADROOM: Final = 0.01
 
 
@@ -132,9 +132,9 @@ def forward_transfer(
     """Forward transfer of Continual World, a pure number of at most 1; 0 means no effect.
 
     (AUC - AUC_b) / (1 - AUC_b), with AUC of the arm and AUC_b of scratch, both areas divided by the
-    horizon (Wołczyk et al., "Continual World", NeurIPS 2021). 1 is the maximum only if no
-    score exceeds 1; there the scores are success rates, here they are clipped. Undefined where
-    scratch leaves a headroom below `MIN_HEADROOM`.
+    horizon (Wołczyk et al., "Continual World", NeurIPS 2021). 1 is the maximum only if no score
+    exceeds 1: Continual World uses success rates, and here scores are clipped. Undefined if the
+    headroom 1 - AUC_b is below `MIN_HEADROOM`.
 
     Args:
         arm: Scores of the arm from `Reference.scores(..., clip=True)`.
@@ -170,16 +170,17 @@ def forward_transfer(
 
 
 class ReachTimes(msgspec.Struct, frozen=True):
-    """When the seeds of one arm reached a threshold.
+    """Times at which the seeds of one arm reached a threshold.
 
-    All seeds count. A seed that did not reach it is right-censored at the horizon H, which all
-    seeds share, so the Kaplan-Meier estimate equals the empirical one.
+    A seed that did not reach the threshold is right-censored at the horizon H, which all seeds
+    share, so the Kaplan-Meier estimate equals the empirical distribution.
 
     Attributes:
-        fraction: Share of the seeds that reached it by H, from 0 to 1.
+        fraction: Share of the seeds that reached the threshold by H, from 0 to 1.
         restricted_mean: Mean of min(time, H) in steps, from 0 to H: the restricted mean survival
             time (Royston & Parmar, BMC Med. Res. Methodol. 13:152, 2013).
-        restricted_median: Step by which half the seeds had reached it; None if fewer did by H.
+        restricted_median: Step by which half the seeds had reached the threshold; None if fewer
+            than half reached it by H.
     """
 
     fraction: float
@@ -207,13 +208,12 @@ class TimeToThreshold(msgspec.Struct, frozen=True):
 def steps_to_reach(curves: LearningCurves, threshold: float) -> NDArray[np.float64]:
     """First step at which each seed is at or above `threshold`, shape (n_seeds,).
 
-    Linear between two evaluations; infinity if the threshold is not reached by the horizon. The
-    grid of evaluations would suffice in target steps, but source steps need not fall on it, and it
-    would round the times of all seeds to a few values.
+    Curves are linear between two evaluations. The step is infinity if the threshold is not reached
+    by the horizon.
 
     Args:
         curves: Curves in target steps or in total steps.
-        threshold: In units of the curves.
+        threshold: The threshold, in units of the curves.
     """
     if curves.source_steps > 0.0 and curves.floor >= threshold:
         return np.zeros(curves.n_seeds)
@@ -252,7 +252,7 @@ def time_to_threshold(
     arm_steps = steps_to_reach(arm, threshold)
     scratch_steps = steps_to_reach(scratch, threshold)
     saved = estimate_difference(
-        # Swapped: fewer steps are the gain.
+        # Scratch comes first, because fewer steps are a gain.
         np.minimum(scratch_steps, scratch.horizon),
         np.minimum(arm_steps, arm.horizon),
     )
@@ -265,7 +265,7 @@ def time_to_threshold(
 
 
 def _reach_times(steps: NDArray[np.float64], horizon: float) -> ReachTimes:
-    """Summarise first steps, shape (n_seeds,), infinite where censored."""
+    """Summarise the steps at which seeds reached a threshold, shape (n_seeds,); inf if never."""
     half = float(np.sort(steps)[(steps.size - 1) // 2])
     return ReachTimes(
         fraction=float(np.isfinite(steps).mean()),
@@ -274,7 +274,7 @@ def _reach_times(steps: NDArray[np.float64], horizon: float) -> ReachTimes:
     )
 
 
-# A grid, because a single threshold could be chosen in hindsight. In units of score.
+# Thresholds in units of score; several, because a single one could be chosen in hindsight.
 DEFAULT_THRESHOLDS: Final = (0.25, 0.5, 0.75, 0.9)
 
 _NO_SCORES: Final = "Undefined: no arm ended above the policies without skill, so no score exists."
@@ -287,7 +287,7 @@ class Measures(msgspec.Struct, frozen=True):
         jumpstart: Initial advantage, in the unit of the summary.
         asymptotic_gain: Final advantage, in the unit of the summary.
         total_reward_gain: Mean advantage, in the unit of the summary.
-        auc_ratio: Area of the arm over area of scratch, a pure number.
+        auc_ratio: Area of the arm divided by area of scratch, a pure number.
         forward_transfer: Share of scratch's headroom that the arm gains, a pure number.
         times_to_threshold: One for each threshold, in order.
     """
@@ -304,9 +304,9 @@ class Summary(msgspec.Struct, frozen=True):
     """All measures of one arm against scratch, with their basis.
 
     Attributes:
-        unit: Unit of the gains: "score", or "value" where no arm learned, so that there are no
-            scores and only jumpstart, asymptotic gain and total reward gain exist.
-        reference: The scale of scores. A gain in values is one in scores times one - zero.
+        unit: Unit of the gains: "score", or "value" if no arm learned, so that there are no scores
+            and only jumpstart, asymptotic gain and total reward gain are defined.
+        reference: The scale of scores. A gain in values is the gain in scores times (one - zero).
         horizon: H, the budget in steps, for both ways of counting.
         source_steps: Training steps of the arm on the source.
         n_seeds_arm: Training runs of the arm.
@@ -342,12 +342,12 @@ def summarise(
 
     Args:
         scratch: Curves of the baseline, in units of return and target steps.
-        arm: Curves of the arm, evaluated at the same steps; or once at step 0 for an arm that is
-            not trained on the target, of which jumpstart and asymptotic gain are defined.
-        reference: The target's own scale.
+        arm: Curves of the arm, evaluated at the same steps. An arm that is not trained on the
+            target is evaluated once at step 0, and only its jumpstart and asymptotic gain exist.
+        reference: The scale of scores of the target.
         source_steps: Training steps of the arm on the source, >= 0.
-        rng: Draws the resamples. Both ways of counting use the same ones, so that without source
-            steps they are equal.
+        rng: Draws the resamples. Measures in target steps and in total steps use the same
+            resamples, so that they are equal without source steps.
         last_k: Number of final evaluations that are averaged.
 
     Raises:
@@ -357,7 +357,7 @@ def summarise(
     draws = int(rng.integers(2**63))
 
     def measure(arm: LearningCurves) -> Measures:
-        """Compute all measures in one way of counting."""
+        """Compute all measures for curves in target steps or in total steps."""
         baseline, ratio, transfer = scratch, undefined(_NO_SCORES), undefined(_NO_SCORES)
         times = tuple(TimeToThreshold(height, None, None, ratio) for height in DEFAULT_THRESHOLDS)
         if reference.defined:

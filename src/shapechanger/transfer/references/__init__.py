@@ -1,4 +1,4 @@
-"""References of each env: its floor, the result of learning from scratch, and a policy with it.
+"""References of envs: values without skill, values of training from scratch, and a policy.
 
 `references.json` and the policies next to it are written by `python -m benchmarks.run references`;
 `README.md` is their card.
@@ -27,10 +27,10 @@ class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
         steps: Env steps of each training.
         seeds: Seeds of the trainings.
         version: Version of Shapechanger.
-        command: The command that measured it.
+        command: The command that measured the reference.
         floor: Values of each measure without skill: for random actions and for the action zero.
         ends: Values of each measure at the end of each training, the mean of its last evaluations.
-        policy_seed: Seed of the policy that ships.
+        policy_seed: Seed of the shipped policy.
     """
 
     learner: str
@@ -43,7 +43,7 @@ class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
     policy_seed: int
 
     def end(self, measure: str) -> float | None:
-        """Return the mean value at the end over the seeds; None if it was not measured.
+        """Return the mean over the seeds of a measure's value at the end; None if not measured.
 
         Args:
             measure: Name of a measure, or "return".
@@ -59,7 +59,7 @@ class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
 
 @cache
 def load_references() -> dict[str, EnvReference]:
-    """Return all references by the ids of their envs."""
+    """Return all references, keyed by the ids of their envs."""
     content = (FOLDER / "references.json").read_bytes()
     return msgspec.json.decode(content, type=dict[str, EnvReference])
 
@@ -70,10 +70,10 @@ def reference_of(env: EnvRef) -> EnvReference | None:
 
 
 def reference_policy(env_id: str) -> Path:
-    """Return the file of the policy that ships for an env.
+    """Return the file of the shipped policy of an env.
 
     Raises:
-        UnknownName: If none ships.
+        UnknownName: If no policy ships for the env.
     """
     if env_id not in load_references():
         raise UnknownName("reference policy", env_id, load_references())

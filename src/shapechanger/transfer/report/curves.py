@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from shapechanger.transfer.study import Study
 
-# Fewest seeds with a band: an interval of two seeds is over ten times as wide as their difference.
+# Fewest seeds for a band: an interval of two seeds is over ten times as wide as their difference.
 _BAND_SEEDS: Final = 3
 
 Counting = Literal["target", "total"]

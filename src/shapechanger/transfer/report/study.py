@@ -1,4 +1,4 @@
-"""The report of a transfer study: one HTML file without other files."""
+"""The report of a transfer study: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 """The source's body and the target's, each of shape (height, width, 3)."""
 
 _MAX_ARGUMENT_LENGTH: Final = 40
-# Names of kinds of runs that are no arms.
+# Names of kinds of runs that are not arms.
 _ARMS: Final = {"random": "random actions", "source": "source policy, in the source"}
 
 
 def study_html(study: Study, pictures: Pictures | None = None, picture_note: str = "") -> str:
     """Render the report of a study."""
-    from shapechanger.transfer.report.curves import learning_curves  # Matplotlib.
+    from shapechanger.transfer.report.curves import learning_curves  # Imports Matplotlib.
 
     plan = study.plan
     measures, arms = measure_rows(study), arm_rows(study)
@@ -106,7 +106,7 @@ def write_study_report(study: Study, out: Path) -> Path:
 
 
 def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
-    """Render both bodies in their start poses at one scale; None if the envs cannot."""
+    """Render both bodies in their start poses at one scale; None if an env cannot be rendered."""
     with closing(source.make()) as one, closing(target.make()) as other:
         both: list[Any] = [one.unwrapped, other.unwrapped]
         if not all(hasattr(env, "picture") for env in both):
@@ -187,7 +187,7 @@ def _defined(row: MeasureRow) -> bool:
 
 
 def _measure_table(arm: str, rows: tuple[MeasureRow, ...], notes: list[str]) -> dict[str, Any]:
-    """The defined measures of one arm, and why the others are undefined."""
+    """Return the defined measures of one arm, and notes on its undefined measures."""
     cells: list[tuple[str, ...]] = []
     undefined: dict[str, list[str]] = {}
     for row in rows:
@@ -206,7 +206,7 @@ def _measure_table(arm: str, rows: tuple[MeasureRow, ...], notes: list[str]) -> 
 
 
 def _terms(arms: tuple[ArmRow, ...]) -> dict[str, Any]:
-    """The reward terms of each kind of run; no rows if no env reports any."""
+    """Return the reward terms of each kind of run; without rows if the env reports none."""
     names = dict.fromkeys(name for row in arms for name in row.terms)
     return {
         "header": ("Term", *(_ARMS.get(row.kind, row.kind).partition(",")[0] for row in arms)),
@@ -221,7 +221,7 @@ def _terms(arms: tuple[ArmRow, ...]) -> dict[str, Any]:
 
 
 def _body_map(ours: BodyMap) -> dict[str, Any]:
-    """Describe the map: entries of the same name are counted, all others are listed."""
+    """Describe the map; entries that copy a feature of the same name are only counted."""
     rows = ours.table()
     matched = [row for row in rows if row.why == SAME_NAME]
     groups: dict[tuple[str, str, str], list[str]] = {}
@@ -245,7 +245,7 @@ def _body_map(ours: BodyMap) -> dict[str, Any]:
 
 
 def _unused(ours: BodyMap) -> list[str]:
-    """Sentences on the target observations and source actions that no rule copies."""
+    """Return sentences that list target observations and source actions that no rule copies."""
     sides = (
         (
             "Target observations that the source policy does not see",

@@ -31,12 +31,12 @@ from shapechanger.transfer.report.verdict import (
 )
 from shapechanger.transfer.study import Study
 
-# Colours of the heat map at its ends, as red, green and blue; white lies between them.
+# Colours of the largest gain and the largest loss in the heat map, as red, green and blue.
 _HELPED: Final = (0, 114, 178)
 _HURT: Final = (213, 94, 0)
-# Share of the full colour that black text can be read on.
+# Largest share of the full colour, so that black text can be read on it.
 _STRONGEST: Final = 0.55
-# Runs of a study below which the page gives no intervals of a bootstrap.
+# Fewest runs of a study for which the page shows bootstrap intervals.
 _LEAST_RUNS: Final = 3
 
 
@@ -48,7 +48,7 @@ class FilmStrip(NamedTuple):
 
 
 class Sweep(NamedTuple):
-    """A property in which the targets of a suite differ, with its value for each target."""
+    """A property in which the targets of a suite differ, with its value for each study."""
 
     name: str
     values: Mapping[str, float]
@@ -66,7 +66,8 @@ def suite_html(
     """Render the page of a suite."""
     if not studies:
         raise StudyError(f"The suite {name} has no finished study to make a page of.")
-    from shapechanger.transfer.report.curves import learning_curves, sweep_chart  # Matplotlib.
+    # Imported here, because it imports Matplotlib.
+    from shapechanger.transfer.report.curves import learning_curves, sweep_chart
 
     first = next(iter(studies.values()))
     arm, plan = first.headline_arm, first.plan
@@ -145,12 +146,12 @@ def _listed(numbers: Sequence[int]) -> str:
 
 
 def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
-    """The pairs as a table of sources and targets; None where each target has one source."""
+    """Return a table of gains by source and target; None if there are too few pairs for one."""
     sources = list(dict.fromkeys(_name(study.plan.task.source) for study in studies.values()))
     targets = list(dict.fromkeys(_name(study.plan.task.target) for study in studies.values()))
     if len(sources) < 2 or len(studies) < 3:
         return None
-    # The same bodies in the same order on both sides.
+    # Targets that are also sources come first, in the order of the sources.
     targets.sort(key=lambda one: sources.index(one) if one in sources else len(sources))
     pairs = {
         (_name(study.plan.task.source), _name(study.plan.task.target)): (one, study)
@@ -160,7 +161,7 @@ def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
     widest = max((abs(gain.value or 0.0) for gain in gains.values()), default=0.0) or 1.0
 
     def colour(share: float) -> str:
-        """CSS colour of a gain, from -1 to 1."""
+        """Return the CSS colour of a gain, from -1 to 1."""
         full = _HELPED if share >= 0.0 else _HURT
         mixed = (round(255 + _STRONGEST * abs(share) * (part - 255)) for part in full)
         return "#{:02x}{:02x}{:02x}".format(*mixed)
@@ -180,7 +181,7 @@ def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
 
 
 def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
-    """Rows for each target and for all together: each arm's scores and chance to beat scratch."""
+    """Return rows of each arm's scores and chance to beat scratch, by target and in total."""
     by_target: dict[str, list[Study]] = {}
     for study in studies.values():
         by_target.setdefault(_name(study.plan.task.target), []).append(study)
@@ -197,7 +198,7 @@ def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
 
 
 def _score_ends(studies: Sequence[Study]) -> dict[str, list[NDArray[np.float64]]]:
-    """Final scores of each arm in studies of one target; without a reference, 1 is the best end."""
+    """Return final scores of each arm for one target; 1 is its reference, or else the best arm."""
     values = {
         arm: [finals(study, arm) for study in studies if arm in study.plan.arms]
         for arm in dict.fromkeys(arm for study in studies for arm in study.plan.arms)
@@ -224,7 +225,7 @@ def _method_rows(
         few = max(group.size for group in groups) < _LEAST_RUNS
 
         def text(estimate: Estimate, few: bool = few) -> str:
-            # Equal resamples give no interval: every run may beat every run of scratch.
+            # If all resamples are equal, they do not define an interval.
             if few or estimate.low == estimate.high:
                 estimate = Estimate(estimate.value)
             return estimate_text(estimate)
@@ -251,7 +252,7 @@ def _settings(studies: Mapping[str, Study]) -> list[tuple[str, str]]:
         ("Source steps", _listed([plan.source_steps for plan in plans])),
         ("Seed", _listed([plan.seed for plan in plans])),
         ("Machine", machine_text(studies.values())),
-        ("Time", f"{number(hours, 1)} h for all runs; those that studies share count in each"),
+        ("Time", f"{number(hours, 1)} h for all runs; shared runs count in each study"),
         ("Runs", count(sum(len(study.runs) for study in studies.values()))),
         ("Versions", ", ".join(f"{name} {version}" for name, version in plans[0].versions.items())),
     ]
@@ -262,7 +263,7 @@ def _name(env: EnvRef) -> str:
     short = env.id.rpartition("/")[2].removesuffix("-v1")
     lenses = env.kwargs.get("lenses") or ""
     extra = ", ".join(
-        # A flag, such as `put_back`, holds for all envs of a suite and names none of them.
+        # A flag, such as `put_back`, is equal for all envs of a suite.
         argument_text(value)
         for key, value in env.kwargs.items()
         if key != "lenses" and not isinstance(value, bool)

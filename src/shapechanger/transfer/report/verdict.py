@@ -25,8 +25,8 @@ from shapechanger.transfer.plan import NO_SKILL, SOURCE
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
 
-# Name, field of `Measures` and sign of each measure that is not a time; the first three are gains,
-# in the unit of the summary, and the others pure numbers.
+# Name, field of `Measures`, and whether a sign is printed, for each measure that is not a time. The
+# first three are gains, in the unit of the summary; the others are pure numbers.
 _MEASURES: Final = (
     ("Jumpstart", "jumpstart", True),
     ("Total reward gain", "total_reward_gain", True),
@@ -38,7 +38,7 @@ _GAINS: Final = 3
 
 
 def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
-    """Format an estimate, with or without a value and an interval."""
+    """Format an estimate with its interval, if they are defined."""
     return interval_text(estimate.value, estimate.low, estimate.high, signed=signed)
 
 
@@ -110,7 +110,7 @@ def _reached(
 
 
 GOOD: Final = 0.9
-"""Share of the way from the score without skill to the best run that counts as having learnt."""
+"""Share of the way from the value without skill to the best run from which a run has learned."""
 
 STRONG: Final = 0.8
 """Share of success from which an arm counts as good on one individual, such as a finger."""
@@ -120,10 +120,10 @@ class ArmRow(NamedTuple):
     """Summary of the runs of one kind.
 
     Attributes:
-        success: Share of successful episodes at the end, with its t-interval over seeds; empty
-            where the env does not report success.
+        success: Share of successful episodes at the end, with its t-interval over seeds; empty if
+            the env does not report success.
         good: Number of runs that covered 90 % of the way from the score without skill to the best
-            run on the target; empty for source policies, and where no run learned.
+            run on the target; empty for source policies, and if no run learned.
     """
 
     kind: str
@@ -141,8 +141,8 @@ class ArmRow(NamedTuple):
 def arm_rows(study: Study) -> tuple[ArmRow, ...]:
     """Summarise each kind of run, first the runs of the source and the policies without skill.
 
-    The end of a run is the mean of its last evaluations, as many as the plan says; for a source
-    policy it is the last one, because that is the policy that is transferred.
+    The end of a run is the mean of its last `last_k` evaluations. The end of a source policy is its
+    last evaluation, because the last policy is transferred.
     """
     return tuple(
         _row(study, kind) for kind in (SOURCE, *NO_SKILL, *study.plan.arms) if study.of(kind)
@@ -150,24 +150,24 @@ def arm_rows(study: Study) -> tuple[ArmRow, ...]:
 
 
 def successes(study: Study, kind: str) -> NDArray[np.float64]:
-    """Success rate of each run at the end, shape (n_seeds,); (0,) if unknown."""
+    """Success rate of each run at the end, shape (n_seeds,); empty if not reported."""
     if any(e.success is None for result in study.of(kind) for e in _end(study, result)):
         return np.empty(0)
     return _means(study, kind, lambda e: e.success or 0.0)
 
 
 def weak_individuals(study: Study) -> list[str]:
-    """Return a sentence for each arm on the individuals, such as fingers, where it rarely succeeds.
+    """Return a sentence for each arm that names the individuals on which it rarely succeeds.
 
-    A mean over individuals hides the weak ones. Empty where all seeds share one body, or the env
-    does not report success.
+    An individual is a body such as one finger. The list is empty if all seeds share one body, or if
+    the env does not report success.
     """
     sentences: list[str] = []
     noun = study.plan.individual.removesuffix("_seed")
     for arm in study.plan.arms if noun else ():
         shares = successes(study, arm)
         indices = [result.run.index for result in study.of(arm)]
-        # Not strict, as `shares` is empty where the env does not report success.
+        # Not strict, because `shares` is empty if the env does not report success.
         ends = sorted(zip(shares.tolist(), indices, strict=False))
         weak = [f"{noun} {index} ({share:.0%})" for share, index in ends if share < STRONG]
         if ends:
@@ -188,12 +188,12 @@ def _means(study: Study, kind: str, of: Callable[[Evaluation], float]) -> NDArra
 
 
 def _end(study: Study, result: RunResult) -> tuple[Evaluation, ...]:
-    """The last evaluations of a run, which are averaged."""
+    """Return the last evaluations of a run, over which its final value is averaged."""
     return result.curve[-1 if result.run.kind == SOURCE else -study.plan.last_k :]
 
 
 def _value(study: Study, evaluation: Evaluation) -> float:
-    """The measure; NaN in a source env that does not declare it."""
+    """Return the study's measure of an evaluation; NaN if the source env lacks it."""
     try:
         return evaluation.value(study.plan.measure)
     except UnknownName:
@@ -218,13 +218,13 @@ def _row(study: Study, kind: str) -> ArmRow:
         success=share_text(successes(study, kind)),
         good=_good(study, kind),
         per_seed=list_text([float(value) for value in at_the_end]),
-        # A missing term counts as 0.
+        # A term that is missing in an evaluation counts as 0.
         terms={name: float(np.mean([e.terms.get(name, 0.0) for e in ends])) for name in terms},
     )
 
 
 def _good(study: Study, kind: str) -> str:
-    """Number of runs that ever came close to the best one, as in `4 of 5`."""
+    """Return how many runs ever came close to the best run, such as `4 of 5`."""
     if kind == SOURCE:
         return ""
     floor = next(iter(study.summaries.values())).reference.zero
@@ -241,17 +241,14 @@ Direction = Literal["up", "down", "unclear"]
 
 _TRANSFER: Final = {"up": "helped", "down": "hurt", "unclear": "made no clear difference"}
 _NO_INTERVAL: Final = "cannot be judged without an interval"
-# Below this many seeds an interval is so wide that only large effects show.
+# With fewer seeds, intervals are so wide that they exclude 0 only for large effects.
 _FEW_SEEDS: Final = 5
-# A rise of scratch by less than this share of its end is not meaningful.
+# If scratch rises by less than this share of its end, arms are not compared.
 _FLAT: Final = 0.1
 
 
 def direction(estimate: Estimate) -> Direction:
-    """Direction of a difference: up or down if its interval excludes 0, otherwise unclear.
-
-    An estimate without an interval is always unclear.
-    """
+    """Return the direction of a difference: unclear if its interval contains 0 or is missing."""
     if estimate.low is not None and estimate.low > 0.0:
         return "up"
     if estimate.high is not None and estimate.high < 0.0:
@@ -267,11 +264,11 @@ def _outcome(estimate: Estimate) -> str:
 
 
 def verdict(study: Study) -> str:
-    """State in one sentence of at most 25 words whether transfer helped; numbers are in the table.
+    """State in one sentence of at most 25 words whether transfer helped.
 
-    Fine-tune is judged by its total reward gain in target steps, a measure chosen in advance; a
-    study without fine-tune by the jumpstart of its first other arm. Where scratch starts within a
-    tenth of its end, the sentence says that the study shows nothing.
+    The headline arm is judged by its total reward gain in target steps, a measure chosen in
+    advance, or by its jumpstart if it is not trained on the target. If scratch starts within a
+    tenth of its end, the sentence states that the study shows nothing.
     """
     arm, plan = study.headline_arm, study.plan
     scratch, text = study.curves("scratch"), partial(_mean_text, unit=plan.unit)
@@ -295,10 +292,11 @@ def verdict(study: Study) -> str:
 
 
 def other_arms(study: Study) -> str:
-    """State in one sentence which of the arms that the verdict leaves out helped; may be empty.
+    """State in one sentence whether the arms other than scratch and the headline arm helped.
 
-    Each is judged by its total reward gain in target steps, or by its jumpstart if it does not
-    learn on the target. The brackets give its measure, averaged over the budget.
+    Each arm is judged by its total reward gain in target steps, or by its jumpstart if it does not
+    learn on the target. The parentheses contain its measure, averaged over the budget. The sentence
+    is empty if there are no such arms, or the study shows nothing.
     """
     others: dict[str, list[str]] = {found: [] for found in (*_TRANSFER.values(), _NO_INTERVAL)}
     for arm, summary in study.summaries.items():
@@ -324,10 +322,7 @@ def _mean_text(values: NDArray[np.float64], unit: str) -> str:
 
 
 def is_flat(study: Study) -> bool:
-    """Return whether scratch starts within a tenth of its end, so that nothing can be compared.
-
-    A study whose other arms rise far above scratch shows something all the same.
-    """
+    """Return whether neither scratch nor another arm ends well above the start of scratch."""
     start = float(study.curves("scratch").returns[:, 0].mean())
     end = float(finals(study, "scratch").mean())
     best = max(float(finals(study, arm).mean()) for arm in study.plan.arms)
@@ -335,7 +330,7 @@ def is_flat(study: Study) -> bool:
 
 
 def devices_of(study: Study) -> dict[str, list[str]]:
-    """Return the kinds of runs that learned on each device; runs of old studies name none."""
+    """Return the kinds of runs that were trained on each device; old studies have no devices."""
     devices: dict[str, list[str]] = {}
     for result in study.runs:
         if result.device and result.run.kind not in devices.setdefault(result.device, []):
@@ -344,7 +339,7 @@ def devices_of(study: Study) -> dict[str, list[str]]:
 
 
 def machine_text(studies: Iterable[Study]) -> str:
-    """Return the machine of the first study, and the devices that any of them learned on.
+    """Return the machine of the first study, and the devices on which any study was trained.
 
     Args:
         studies: Studies, at least one.
@@ -356,11 +351,11 @@ def machine_text(studies: Iterable[Study]) -> str:
 
 
 def caveats(study: Study) -> tuple[str, ...]:
-    """Limits of the numbers, one or two sentences each."""
+    """Return caveats about the numbers, one or two sentences each."""
     summary = next(iter(study.summaries.values()))
     source, budget = count(summary.source_steps), count(summary.horizon)
     sentences: list[str] = []
-    # Every measure in total steps but the jumpstart then compares no skill with scratch.
+    # All measures in total steps except the jumpstart then compare no skill with scratch.
     if summary.source_steps >= summary.horizon:
         sentences.append(
             f"The source used {source} steps and the budget is {budget}, so in total steps "
@@ -380,13 +375,13 @@ def caveats(study: Study) -> tuple[str, ...]:
     if study.plan.individual:
         sentences.append(
             f"Each seed has its own target, whose {study.plan.individual} is the index of the "
-            "seed: the intervals are over these, too."
+            "seed: the intervals include the variation between targets."
         )
     if len(devices := devices_of(study)) > 1:
         named = "; ".join(f"on {device} {', '.join(kinds)}" for device, kinds in devices.items())
         sentences.append(
             f"Not all runs learned on the same device ({named}): worlds on a GPU start and round "
-            "differently, so a difference between arms may be one between devices."
+            "differently, so a difference between arms may be due to the devices."
         )
     if len(study.looks) > 1:
         looks = " and ".join(map(str, study.looks))

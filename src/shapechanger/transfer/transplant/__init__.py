@@ -1,12 +1,12 @@
 """Transplant a trained policy into the shapes of another body, to continue training there.
 
-A body map is affine, and so are the first and the last layer of a network: the first layer absorbs
-the map of observations, and the last layer the map of actions. Before any training the transplanted
-policy does in the target what the source policy does through the map, up to rounding; new inputs
-start with weights of zero and are trainable.
+A body map is affine, and so are the first and the last layer of a network. The first layer absorbs
+the map of observations, and the last layer absorbs the map of actions. Before training, the
+transplanted policy acts in the target exactly like the source policy through the map, up to
+rounding. New inputs start with weights of zero and are trainable.
 
-`transplant` moves a model of Stable-Baselines3, and `transplant_normalisation` the statistics that
-its observations are normalised by.
+`transplant` moves a model of Stable-Baselines3, and `transplant_normalisation` moves the statistics
+that normalise its observations.
 """
 
 try:

@@ -21,7 +21,7 @@ from shapechanger.transfer.body_map import BodyMap, Copy, Learn
 EPSILON: Final = 1e-8
 """Constant that Stable-Baselines3's `VecNormalize` adds to a variance by default."""
 CLIP: Final = 10.0
-"""Default of `VecNormalize`: the largest magnitude of a normalised number."""
+"""Largest magnitude of a normalised number, the default of `VecNormalize`."""
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ class Scaling(NamedTuple):
 
     @classmethod
     def of(cls, statistics: RunningMeanStd, epsilon: float, clip: float) -> Scaling:
-        """Return the normalisation by statistics of a training."""
+        """Return the normalisation with the statistics of a training."""
         return cls(np.asarray(statistics.mean, np.float64), np.sqrt(statistics.var + epsilon), clip)
 
 
@@ -68,8 +68,8 @@ def observation_affine(body_map: BodyMap, source: Scaling, target: Scaling) -> A
 
         z_s = diag(1 / sigma_s) M diag(sigma_t) z_t + (M mean_t + c - mean_s) / sigma_s
 
-    The clipping of z_t replaces the clipping of z_s, which is the same if a number keeps its
-    statistics. A constant number is clipped here.
+    The clipping of z_t replaces the clipping of z_s; they are equal if a number keeps its
+    statistics. Constant numbers are clipped here.
     """
     matrix = body_map.observation_matrix * target.sigma / source.sigma[:, np.newaxis]
     seen = body_map.observation_matrix @ target.mean + body_map.observation_offset
@@ -82,10 +82,11 @@ def observation_affine(body_map: BodyMap, source: Scaling, target: Scaling) -> A
 def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> RunningMeanStd:
     """Transplant observation statistics from the source to the target.
 
-    A target number that a source number copies gets its mean and variance, through the scale; of
-    several copies, the one of the same name counts, or else the first. A new number is assumed
-    uniform in its range, or to have the mean nearest to 0 and the variance 1 if it has no range.
-    The count is kept, so the source's experience keeps its weight.
+    If a source number copies a target number, the target number gets the source's mean and
+    variance, divided by the scale. Of several copies, the copy of the same name counts, or else the
+    first. A new number is assumed to be uniform in its range. Without a range, it gets the value
+    in the range nearest to 0 as its mean, and the variance 1. The count is kept, so the source's
+    experience keeps its weight.
 
     Args:
         source: Mean and variance of the source's observations, shape (source_observation.size,).
@@ -123,12 +124,12 @@ _SAME: Final = 1e-6
 
 
 class OutputMap(NamedTuple):
-    """One layer of outputs, from the source's: y_target = matrix y_source + offset.
+    """Map from the source's outputs to the target's: y_target = matrix y_source + offset.
 
     Attributes:
         matrix: Shape (n_target, n_source).
         offset: Shape (n_target,).
-        fresh: Which outputs are to be learned and get the weights of a new policy, shape
+        fresh: Whether each output has the rule `learn` and gets the weights of a new policy, shape
             (n_target,).
     """
 
@@ -138,17 +139,17 @@ class OutputMap(NamedTuple):
 
 
 class PolicyOutputs(NamedTuple):
-    """The output layers of a Gaussian policy."""
+    """Maps of the two output layers of a Gaussian policy."""
 
     mean: OutputMap
     log_std: OutputMap
 
 
 def gaussian_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> PolicyOutputs:
-    """Outputs of a policy without squashed actions, such as PPO.
+    """Return the maps of outputs of a policy without squashed actions, such as PPO.
 
-    The map is in the units of the layouts, a_t = N a_s + d, and the outputs are in the units of the
-    models, a = middle + half y.
+    The body map is in the units of the layouts, a_t = N a_s + d. The outputs y are in the units of
+    the models, a = middle + half y.
     """
     ours = ActionScale.between(source, body_map.source_action)
     theirs = ActionScale.between(target, body_map.target_action)
@@ -160,10 +161,10 @@ def gaussian_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
 
 
 def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> PolicyOutputs:
-    """Outputs of a policy with actions squashed by tanh to the bounds of the space, such as SAC.
+    """Return the maps of outputs of a policy that squashes actions by tanh, such as SAC.
 
-    With u = tanh(mean) in [-1, 1] the action is middle + half u. Since tanh is odd, a sign can move
-    inside, but no other scale.
+    With u = tanh(mean) in [-1, 1], the action is middle + half u. Since tanh is odd, a change of
+    sign can be applied to the mean, but no other scale can.
     """
     matrix = body_map.action_matrix
     signs, squashed = np.zeros_like(matrix), np.zeros(len(matrix))
@@ -195,10 +196,10 @@ def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
 def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) -> Affine:
     """Map squashed target actions to squashed source actions, for SAC's critics.
 
-    This is the inverse of the outputs. Where several target actions copy one source action, the one
-    of the same name represents it, or else their mean: both are exact for the policy's actions. A
-    target action without an origin has no weight until trained, and a source action without a copy
-    counts as the action 0.
+    This is the inverse of the map of outputs. If several target actions copy one source action, the
+    copy of the same name represents it, or else their mean; both are exact for the policy's
+    actions. A target action that copies no source action has the weight 0 until trained, and a
+    source action without a copy is assumed to be 0.
     """
     signs = outputs.mean.matrix
     source_names, target_names = _names(body_map.source_action), _names(body_map.target_action)
@@ -222,7 +223,7 @@ def _outputs(body_map: BodyMap, matrix: Array, offset: Array, log_scale: Array) 
     places = body_map.target_action.slices
     for entry in body_map.action:
         fresh[places[entry.feature]] = isinstance(entry.rule, Learn)
-    # An action has the log standard deviation of its origin, or without one the mean of all.
+    # An action gets the log standard deviation of its source action, or else the mean of all.
     taken = matrix != 0.0
     mean = np.full_like(matrix, 1.0 / matrix.shape[1])
     spread = np.where(taken.any(axis=1, keepdims=True), taken.astype(np.float64), mean)
@@ -230,14 +231,14 @@ def _outputs(body_map: BodyMap, matrix: Array, offset: Array, log_scale: Array) 
 
 
 class BoundaryLayers(NamedTuple):
-    """The layers of a network that depend on the body."""
+    """Maps of the layers that depend on the body, keyed by the name of the layer."""
 
     inputs: dict[str, Affine]
     outputs: dict[str, OutputMap]
 
 
 def first_linear(network: nn.Module, name: str, otherwise: Iterable[str] = ()) -> list[str]:
-    """Return the name of the first linear layer of a network, or other names if it has none."""
+    """Return the name of a network's first linear layer, or else `otherwise`."""
     for child, module in network.named_children():
         if isinstance(module, nn.Linear):
             return [f"{name}.{child}"]
@@ -247,9 +248,9 @@ def first_linear(network: nn.Module, name: str, otherwise: Iterable[str] = ()) -
 def move_parameters(
     source: nn.Module, target: nn.Module, boundary: BoundaryLayers
 ) -> dict[str, torch.Tensor]:
-    """Compute the parameters with which `target` computes what `source` computes.
+    """Return parameters for `target` that make it equivalent to `source` through the maps.
 
-    Everything is computed in float64 and stored as the source stores it.
+    They are computed in float64 and stored in the source's type.
     """
     trained, new = source.state_dict(), target.state_dict()
     moved = {name: tensor.detach().clone() for name, tensor in trained.items()}

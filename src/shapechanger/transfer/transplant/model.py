@@ -85,7 +85,7 @@ def _new_model(
 
 
 def _is_squashed(model: BaseAlgorithm) -> bool:
-    """Whether a model has a policy as SAC's, which squashes its actions to the bounds."""
+    """Return whether a model's policy squashes its actions to the bounds, as in SAC."""
     return isinstance(model.policy, SACPolicy | tqc.TQCPolicy)
 
 
@@ -99,7 +99,7 @@ def check_supported(model: object) -> None:
 
 
 def _problem(model: object) -> str:
-    """Return why the model is not supported, as a sentence; empty if it is."""
+    """Return a sentence with the reason if the model is not supported; otherwise empty."""
     if not isinstance(model, BaseAlgorithm):
         return f"This model is {type(model).__name__}."
     policy = model.policy
@@ -136,21 +136,20 @@ def transplant(
 ) -> Model:
     """Return a model for the target that acts like the source model through the map.
 
-    The actor, PPO's value network, the critics of SAC and TQC and their targets, log standard
+    The actor, PPO's value network, the critics and target critics of SAC and TQC, log standard
     deviations and the entropy coefficient are moved; optimisers, buffers and step counts are new.
-    An action to be learned gets the weights, and with PPO the log standard deviation, of an
+    An action with the rule `learn` gets the weights, and with PPO the log standard deviation, of an
     untrained policy. A constant action gets the mean log standard deviation of the source, so that
     it is explored.
 
-    Observations: if the target env normalises them with `VecNormalize`, its statistics become
-    the source's, see `transplant_normalisation`. Where it does not, the source's statistics
-    go into the first layer, which is exact up to the clipping of `VecNormalize`.
+    If the target env normalises observations with `VecNormalize`, its statistics are replaced by
+    the source's, see `transplant_normalisation`. Otherwise the first layer absorbs the source's
+    statistics, which is exact up to the clipping of `VecNormalize`.
 
-    Actions: the map is in the units of the layouts, to whose ranges the action space of each model
-    is scaled if it differs, see `shapechanger.transfer.actions`. PPO's are moved before they
-    are clipped to the bounds. Critics stay in the units of the
-    rewards that they learned from, so return statistics are moved with them if
-    `VecNormalize` is on both sides.
+    The map is in the units of the layouts. A model with another action space scales its actions to
+    the ranges of the layout, see `shapechanger.transfer.actions`. PPO's actions are moved before
+    they are clipped to the bounds. Critics keep the units of the rewards that they were trained on,
+    so return statistics are moved too if both envs use `VecNormalize`.
 
     Args:
         source_model: A model with the `MlpPolicy` of PPO, SAC or TQC, of any `net_arch`, trained on
@@ -159,7 +158,7 @@ def transplant(
         target_env: The env to continue training in; flat spaces of the map's target sizes.
         normalisation: Normalisation of the source's observations; by default the normalisation of
             the model's own env. Needed for a model that was loaded without its env.
-        seed: Seed of the new model, and so of the weights to be learned. As any model of
+        seed: Seed of the new model and of its untrained weights. Like every new model of
             Stable-Baselines3, it seeds Python, NumPy and PyTorch.
         device: Device of the new model; by default the source model's.
         **settings: Arguments of the model's class that differ from the source model's.
@@ -169,7 +168,7 @@ def transplant(
 
     Raises:
         TransplantError: If the policy is of another kind, SAC would have to scale an action, or
-            only the target normalises its observations, with statistics that keep changing.
+            only the target normalises its observations and its statistics are still updated.
         SpaceMismatch: If a space does not have the size of its layout.
     """
     check_supported(source_model)
@@ -203,7 +202,7 @@ def transplant(
 def _sensed(
     body_map: BodyMap, source: RunningMeanStd | VecNormalize | None, target: VecNormalize | None
 ) -> Affine:
-    """Map the target network's inputs to the source's; set the target's statistics."""
+    """Return the map from the target network's inputs to the source's; set target statistics."""
     statistics = cast("RunningMeanStd | None", source)
     if isinstance(source, VecNormalize):
         statistics = cast("RunningMeanStd", source.obs_rms) if source.norm_obs else None
