@@ -32,7 +32,7 @@ MINUTES: Final = 10
 LONG_LAYOUTS: Final = 300
 FEW_MINUTES: Final = 2
 FEW_SEEDS: Final = 3
-# Offset of the seeds of later recordings, and of those of each seed of the study.
+# Offsets of seeds: between recordings of one round, and between seeds of the study.
 LATER: Final = 100_000
 APART: Final = 1_000
 

@@ -1,4 +1,4 @@
-"""The demo as a user runs it: its time, and what it shows."""
+"""Time and results of `make demo`."""
 
 from __future__ import annotations
 

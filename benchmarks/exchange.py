@@ -1,4 +1,4 @@
-"""What the video of a LeRobot export changes in the images of the vehicles' cameras."""
+"""Errors of camera images after an export to LeRobot's video and an import."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Accuracy of the controller with a model of the finger: reaching points and following a circle."""
+"""Accuracy of a controller that has a model of the finger: reaching points, following a circle."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shapechanger.finger.controller import FingerController
 from shapechanger.finger.tensions import DRIVES
 
 TARGETS: Final = 1000
-# Beyond all seeds used for tuning.
+# First seed of the evaluation, larger than all seeds used for tuning.
 FIRST_SEED: Final = 1_000_000
 _TRACKS: Final = 5
 

@@ -21,11 +21,11 @@ from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 
 _SECONDS = 10.0
-# Exactly one tick of the guard, on the twin's clock.
+# Delay of a command on a twin: exactly one tick of the guard, s.
 _DELAY_S = 0.010
 _NEAR_S = 0.005
 _EPISODES = 5
-# Far from the seeds of trainings and evaluations.
+# Seed of the first episode, far from the seeds of trainings and evaluations.
 _FIRST_SEED = 3_000_000
 # The first steps are left out, so that the replay starts in motion.
 _BEGINS = 10

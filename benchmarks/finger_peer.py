@@ -30,7 +30,7 @@ def _make(kind: str) -> Any:
 
 
 def main() -> None:
-    """Answer until standard input ends."""
+    """Execute requests until standard input ends."""
     kind = sys.argv[1]
     env = _make(kind)
     env.reset(seed=0)

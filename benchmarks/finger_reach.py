@@ -1,4 +1,4 @@
-"""Targets that the fingers of a gap can hold, by statics and by the controller that knows them."""
+"""Targets that the fingers of a gap can hold, by statics and by a controller with their model."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Send mutated messages to a robot: no crash, no accepted command, constant memory.
 
 `python -m benchmarks.fuzz_link --count 1000000` mutates messages of every kind (flipped bits, cuts,
-splices, wrong lengths, deep nesting, huge numbers) and hands them to a session of the daemon, as
-its WebSocket would. The robot has a driver, so orders can go through; the fuzzing client has no
-right to any but an emergency stop. `tests/robot/daemon/test_fuzz.py` sends a few thousand.
+splices, wrong lengths, deep nesting, huge numbers) and passes them to a session of the daemon, as
+its WebSocket would. Another client controls the robot, so the robot accepts commands. The fuzzing
+client may only send an emergency stop. `tests/robot/daemon/test_fuzz.py` sends a few thousand.
 """
 
 from __future__ import annotations

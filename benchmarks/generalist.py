@@ -1,9 +1,9 @@
 """One policy for bodies outside the training, against a padded network with the same data.
 
-Each policy learns in 32 drawn ants and is judged, without learning, in those and in 32 others of
-each split, one episode each, and in the extended ant, whose legs have more joints. Policies are
-kept in `results/generalist`, and finished trainings are not repeated; `SEEDS` sets their number and
-`WORKERS` how many train at a time. The scores of each body go into
+Each policy is trained in 32 drawn ants. It is evaluated in these ants, in 32 other ants of each
+split, and in the extended ant, whose legs have more joints, with one episode in each body. Policies
+are kept in `results/generalist`, and finished trainings are not repeated. `SEEDS` sets the number
+of trainings, and `WORKERS` how many run at a time. The scores of each body are written to
 `benchmarks/results/generalist-runs.json`.
 """
 
@@ -71,7 +71,7 @@ class Scores(msgspec.Struct, frozen=True):
 
 
 def generalist() -> list[Row]:
-    """Train and judge the policies of both networks."""
+    """Train and evaluate the policies of both networks."""
     seeds = range(int(os.environ.get("SEEDS", SEEDS)))
     work = [(network, seed) for seed in seeds for network in ("limbs", "padded")]
     OUT.mkdir(parents=True, exist_ok=True)

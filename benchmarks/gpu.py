@@ -1,12 +1,12 @@
-"""The trial of a GPU: parity with the CPU, speed, waiting, training, and what bodies cost.
+"""Trial of a GPU: parity with the CPU, speed, waits, training, and the cost of different bodies.
 
-Each part writes its rows as it ends, and a part that fails is a row with its error. Without a GPU
-nothing is measured and the results stay as they are; `python -m benchmarks.run gpu-on-cpu` measures
-the ratios that Warp's CPU device can show. `scripts/gpu_machine.sh` prepares what a machine without
-a network lacks, and runs the trial there.
+Each part writes its rows as it ends, and a part that fails writes a row with its error. Without a
+GPU the trial measures nothing and keeps earlier results; `python -m benchmarks.run gpu-on-cpu`
+measures ratios on Warp's CPU device. `scripts/gpu_machine.sh` prepares a machine without a network,
+and runs the trial there.
 
 `python -m benchmarks.run gpu-generalist` trains one policy in many bodies on a GPU and keeps it in
-`benchmarks/results`, and `python -m benchmarks.run generalist-gpu` judges it on a CPU.
+`benchmarks/results`, and `python -m benchmarks.run generalist-gpu` evaluates it on a CPU.
 
     LIMIT: Seconds for that training, which is shortened to as many steps as fit.
     GPU_REFERENCE: A file of `python -m benchmarks.gpu FILE`, written on a machine on which Warp
@@ -95,7 +95,7 @@ def generalist() -> Iterator[Row]:
 
 
 def _there() -> bool:
-    """Return whether there is a GPU, and say so if not."""
+    """Return whether there is a GPU; print a message if not."""
     if not GPU:
         sys.stderr.write("There is no GPU here: its results stay as they are.\n")
     return GPU

@@ -2,8 +2,8 @@
 
     python -m benchmarks.gpu_kernels
 
-They go to Warp's cache (`WARP_CACHE_PATH`), which can be carried to the machine with the GPU; there
-the first steps then take no minutes. Warp brings the compiler for GPUs along.
+The kernels are stored in Warp's cache (`WARP_CACHE_PATH`). If the cache is copied to the machine
+with the GPU, its first steps need no compilation. Warp includes the compiler for GPUs.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ the function; a mutant is killed if one of them fails. `make mutants` runs all o
 on two cores; `ONLY="guard metrics" make mutants` runs some. Results are kept in `mutants/`, and
 only mutants of files that have changed run again.
 
-Mutants are not counted if they change only the text of an error, of which tests match some words,
-a type for checkers, or `strict` of `zip`. Nor are those in `equivalent_mutants.toml`, which no test
-could notice, each with its reason.
+Mutants are not counted if they only change the text of an error, a type for checkers, or `strict`
+of `zip`. Mutants in `equivalent_mutants.toml`, which are equivalent to the original for the reasons
+given there, are not counted either.
 """
 
 from __future__ import annotations

@@ -229,7 +229,7 @@ def _photographed(ref: EnvRef, policy: Any) -> tuple[Picture, float]:
 
 CLIPS: Final[Mapping[str, Callable[[], list[Panel]]]] = {
     "walking": lambda: _bodies("Ant AmputatedAnt BigAnt ExtendedAnt", seconds=8.0),
-    # Starts vary more than those of the policies' training, so that there is something to see.
+    # Starts vary more than in the training of the policies, so that the motion is visible.
     "balancing": lambda: _bodies(
         "SmallInvertedPendulum InvertedPendulum BigInvertedPendulum",
         "InvertedDoublePendulum",

@@ -93,7 +93,7 @@ def test_a_finger_loads_few_modules() -> None:
 
 @pytest.mark.parametrize("blocked", ["mujoco", "glfw", "imageio"])
 def test_missing_dependencies_of_mujoco_envs_name_the_extra(blocked: str) -> None:
-    """Without one of them, making an env raises an error with the command that installs it."""
+    """If a dependency is missing, making an env raises an error with the command to install it."""
     every = (*_IDS, *_FINGERS, *(_VEHICLES if blocked == "mujoco" else ()))
     lines = _run(_BLOCK.format(blocked=blocked) + _MAKE.format(ids=every)).splitlines()
     assert len(lines) == len(every)

@@ -264,7 +264,7 @@ def test_healthy_z_range_can_be_set() -> None:
 
 
 def test_termination_can_be_disabled() -> None:
-    """With `terminate_when_unhealthy=False`, like Ant-v5."""
+    """`terminate_when_unhealthy=False` has the same effect as in Ant-v5."""
     with gym.make("shapechanger/Ant-v1", terminate_when_unhealthy=False) as made:
         env: Any = made.unwrapped
         made.reset(seed=0)

@@ -122,7 +122,7 @@ def _until_it_bumps(env: VehicleEnv) -> tuple[float, bool]:
 
 
 def test_a_bumped_wall_costs_ten_and_ends_the_episode() -> None:
-    """With `put_back`, the episode continues."""
+    """An episode with `put_back` continues after a collision."""
     with closing(VehicleEnv("car", image=False)) as env:
         assert _until_it_bumps(env) == (-10.0, True)
     with closing(VehicleEnv("car", image=False, put_back=True)) as env:

@@ -231,7 +231,7 @@ class _Check:
             assert _sensed(self.after, "tip_2") == ["tip_2", "origin"]
 
     def contacts(self) -> None:
-        """Each part of what is excluded stays excluded, and of what is paired stays paired."""
+        """All parts of excluded bodies remain excluded, and parts of paired geoms remain paired."""
         excluded = {frozenset(pair) for pair in _excluded(self.after)}
         paired = {self.after.geom(int(g)).name for g in self.after.pair_geom2}
         for body in _names(self.after, "body"):
@@ -262,7 +262,7 @@ class _Check:
         assert aim == ("base" if "left" in self.gone else "left")
 
     def keyframe(self) -> None:
-        """Every joint and actuator has its own numbers; copies those of the original."""
+        """Every joint and actuator keeps its values, and copies have the values of the original."""
         for model, address, values in (
             ("joint", "qposadr", "key_qpos"),
             ("actuator", "id", "key_ctrl"),

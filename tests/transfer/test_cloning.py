@@ -291,7 +291,7 @@ def test_a_missing_policy_is_refused(tmp_path: Path) -> None:
 def test_source_steps_are_those_of_arms_that_train_their_own(
     ppo_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With a given policy they count if another policy learns in the source."""
+    """If a source policy is given, source steps only have an effect on arms that train another."""
     counted: list[int] = []
 
     def summarised(*arguments: Any, source_steps: int, **more: Any) -> Summary:

@@ -26,7 +26,7 @@ def ant_mirror() -> BodyMap:
 
 
 def test_the_mirror_of_an_ant() -> None:
-    """Worked out by hand: y and axial x and z are negated, hips too, ankles not."""
+    """The mirror negates y, axial x and z, and angles of hips, but not angles of ankles."""
     taken = {entry.feature: entry.rule for entry in ant_mirror().observation}
 
     def scale(name: str) -> float:

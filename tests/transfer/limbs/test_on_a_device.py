@@ -94,7 +94,7 @@ def test_what_the_adapter_promises() -> None:
 
 
 def test_what_it_refuses() -> None:
-    """Callbacks and budgets below one evaluation, which other learners take."""
+    """The learner refuses callbacks, and budgets below one evaluation."""
     learner = RslLearner("rsl-ppo", SETTINGS)
     with pytest.raises(StudyError, match="cannot use callbacks"):
         learner.train(PENDULUM, 2048, 0, callback=object(), on_evaluation=print)
@@ -190,7 +190,7 @@ def test_probabilities_are_those_of_the_policy(policy: TrainedPolicy) -> None:
 
 
 def test_worlds_of_equal_spaces_and_several_batches() -> None:
-    """Rows and actions are one tensor for all batches, like those of the vector env."""
+    """Rows and actions of all batches are one tensor, as in the vector env."""
     bodies = ["Swimmer", to_json([JointRange("free_body_rot", -2.0, 2.0)])]
     swimmer = EnvRef("shapechanger/Swimmer-v1")
     envs = shapechanger.make_vec("Swimmer", 2, backend="warp", device="cpu", bodies=bodies)

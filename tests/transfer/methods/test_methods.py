@@ -198,7 +198,7 @@ def test_intermediate_bodies_grow() -> None:
 
 
 def test_bodies_of_two_families_are_refused() -> None:
-    with pytest.raises(StudyError, match="not of one family"):
+    with pytest.raises(StudyError, match="must be bodies of one family"):
         bodies_between(ANT, BIG, 1)
     finger = EnvRef("shapechanger/Finger-v1")
     task = TransferTask(finger, finger.having({"gap": "real-like"}))

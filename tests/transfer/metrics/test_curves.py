@@ -1,4 +1,4 @@
-"""Learning curves and scores: validation, interpolation, areas and references by hand."""
+"""Learning curves and scores: validation, interpolation, and hand-computed areas and references."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ SCRATCH = LearningCurves(FEW, np.array([[-100.0, 200.0, 300.0], [-100.0, 400.0, 
 
 
 def test_scores_run_from_zero_to_one() -> None:
-    """0 takes no skill and 1 is the end of the best arm; a better run is above 1."""
+    """A score of 0 is the value without skill and 1 the best arm's end; better runs are above 1."""
     reference = Reference(zero=-100.0, one=300.0)
     scores = reference.scores(LearningCurves(FEW, np.array([[-200.0, 100.0, 500.0]])))
     np.testing.assert_allclose(scores.returns, [[-0.25, 0.5, 1.5]])

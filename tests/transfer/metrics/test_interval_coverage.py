@@ -69,7 +69,7 @@ def test_ratios_cover_what_the_docs_state() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: "-".join(map(str, case)))
 def test_the_table_can_be_measured_again(case: Case) -> None:
-    """With other draws the coverage is within four standard errors of the table."""
+    """The coverage with other random draws is within four standard errors of the table."""
     trials, of_table = 1500, 4000
     for found, claimed in zip(measure(case, trials, seed=1).values(), table()[case], strict=True):
         share = claimed.coverage

@@ -1,4 +1,4 @@
-"""Intervals of one study and of several: by hand, against scipy, and samples without one."""
+"""Intervals equal hand-computed values and scipy's; some samples have no interval."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_welch_agrees_with_scipy() -> None:
 
 
 def test_welch_takes_one_arm_without_spread() -> None:
-    """Where one arm has no spread, the other gives the degrees of freedom."""
+    """If one arm has no spread, the degrees of freedom depend on the other arm only."""
     estimate = estimate_difference(np.array([1.0, 2.0, 3.0]), np.zeros(5))
     half = float(stats.t.ppf(0.975, 2)) * np.sqrt(1.0 / 3.0)
     np.testing.assert_allclose([estimate.low, estimate.high], [2 - half, 2 + half])
@@ -151,7 +151,7 @@ def _rng() -> np.random.Generator:
 
 
 def test_the_middle_half_is_averaged() -> None:
-    """Of eight runs the two lowest and the two highest do not count."""
+    """The interquartile mean of eight runs ignores the two lowest and the two highest."""
     groups = [np.array([0.0, 1.0, 2.0, 100.0]), np.array([-50.0, 3.0, 4.0, 5.0])]
     found = interquartile_mean(groups, rng=_rng())
     assert found.value == pytest.approx((1.0 + 2.0 + 3.0 + 4.0) / 4)

@@ -1,4 +1,4 @@
-"""The measures of an arm against scratch, and their summary, by hand."""
+"""Measures of an arm against scratch, and their summary, equal hand-computed values."""
 
 from __future__ import annotations
 
@@ -236,7 +236,7 @@ def test_interval() -> None:
 
 
 def test_forward_transfer_in_total_steps() -> None:
-    """With half the budget on the source: (0.15 - 0.2) / (1 - 0.2)."""
+    """Half of the budget is spent on the source, so the result is (0.15 - 0.2) / (1 - 0.2)."""
     assert transfer(in_total_steps(BETTER, 10, 0.0), WORSE).value == pytest.approx(-0.0625)
 
 
@@ -361,7 +361,7 @@ def test_zero_shot_is_summarised_without_error() -> None:
         assert measured.asymptotic_gain.value == pytest.approx(-0.5)
         for missing in (measured.total_reward_gain, measured.auc_ratio, measured.forward_transfer):
             assert missing.value is None
-            assert "one evaluation only" in missing.note
+            assert "only one evaluation" in missing.note
         assert all(times.arm is None for times in measured.times_to_threshold)
     assert result.in_target_steps.jumpstart.value == pytest.approx(0.5)
     assert result.in_total_steps.jumpstart.value == pytest.approx(0.0)

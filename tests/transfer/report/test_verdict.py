@@ -79,7 +79,7 @@ def test_the_other_arms_have_a_sentence() -> None:
 
 
 def test_seeds_without_spread_are_not_called_unclear() -> None:
-    """Where all seeds are equal there is no interval, which is not the same as no difference."""
+    """If all seeds are equal, the verdict states that there is no interval."""
     scratch = SCRATCH.copy()
     scratch[:, 0] = 27.0
     solved = np.full((len(scratch), 1), 1000.0)

@@ -247,7 +247,7 @@ def test_the_identity_changes_no_bit(kind: type[Any]) -> None:
 
 
 def test_each_weight_goes_to_its_name() -> None:
-    """A linear policy, by hand: each column moves to the feature of its name."""
+    """Each column of a linear policy moves to the feature of the same name."""
     observation = Layout(tuple(Feature(name, "1") for name in ("a", "b", "c")))
     seen = Layout(tuple(Feature(name, "1") for name in ("c", "new", "a", "b")))
     body_map = BodyMap.between(
@@ -421,7 +421,7 @@ def test_statistics_of_the_target_env_are_replaced(kind: type[Model]) -> None:
 def test_statistics_can_be_folded_into_the_weights(
     kind: type[Model], given: bool, epsilon: float
 ) -> None:
-    """Without normalisation of the target, the statistics go into the first layer."""
+    """If the target does not normalise, the first layer absorbs the source's statistics."""
     body_map = MAPS["mirror"]
     source = trained(kind, body_map, normalised=True)
     theirs = source.get_vec_normalize_env()
