@@ -83,7 +83,7 @@ _WAYS: Final = {
     _BASE: (0.2, DEMOS, 1),
     "all learned, as with --held-out 0": (0.0, DEMOS, 1),
     "all learned, to the last step": (0.0, msgspec.structs.replace(DEMOS, held_out=0.0), 1),
-    # A single network holds out the end.
+    # The training of a single network holds out the end of the frames.
     "four fifths learned, the fifth for stopping alone": (
         0.0,
         msgspec.structs.replace(DEMOS, held_out=0.2, members=1),

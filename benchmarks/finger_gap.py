@@ -44,7 +44,7 @@ STEPS: Final = 61_440
 # Steps of the arms that learn in simulated fingers; with half as many, `identified` reaches 85 %.
 SIMULATED: Final = 614_400
 RIGS: Final = 5
-# On a rig, half as many are enough.
+# Steps of the arms that learn in simulated fingers, for a rig.
 RIG_SIMULATED: Final = 307_200
 # Two minutes on a bench, for a comparison of arms that do not learn on the target.
 FOLLOW_STEPS: Final = 6144

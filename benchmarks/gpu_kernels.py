@@ -44,7 +44,7 @@ def launched() -> set[tuple[Any, int]]:
 
     def noted_tiled(kernel: Any, *arguments: Any, **more: Any) -> Any:
         note(kernel, more["block_dim"])
-        inside[0] += 1  # It calls `launch` with the block size of a CPU.
+        inside[0] += 1  # This function calls `launch` with the block size of a CPU.
         try:
             return launch_tiled(kernel, *arguments, **more)
         finally:

@@ -70,7 +70,7 @@ def _tried(
     fault = FAULTS[name]
     path = folder / f"{fault.name}{'' if one_shot else ', no one-shot'}.jsonl".replace(" ", "-")
     lines = path.read_text().splitlines() if path.exists() else []
-    # The library of Python writes infinity, which stands for never.
+    # Python's json, unlike msgspec, can write infinity, the time of a robot that never stopped.
     found = [msgspec.convert(json.loads(line), TrialResult) for line in lines]
 
     def keep(result: TrialResult) -> None:
