@@ -177,14 +177,15 @@ def test_the_rest_of_a_damaged_tub_is_imported(
 
 
 def test_catalogs_in_another_order(tmp_path: Path) -> None:
-    """Records are read in the order of their `_index`."""
+    """Records are read in the order of their `_index`, which is reported."""
     folder = tub_folder(tmp_path / "tub", records(6))
     in_manifest('"catalog_0.catalog", "catalog_1.', '"catalog_1.catalog", "catalog_0.')(folder)
     in_manifest('"current_index": 6', '"current_index": 9')(folder)
     in_manifest('"deleted_indexes": []', '"deleted_indexes": [2, 8, 9]')(folder)
     episodes, done = imported(folder)
     assert episodes == [[0, 1, 3, 4, 5]]
-    assert findings_of(done).splitlines()[:2] == [
+    assert findings_of(done).splitlines()[:3] == [
+        "warning: The _index does not always rise: the records are read in its order.",
         "note: 3 of the records 0 to 8 are in no catalog.",
         "warning: 1 of the deleted indexes belong to no record: 9.",
     ]

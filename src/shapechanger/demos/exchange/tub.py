@@ -140,6 +140,9 @@ def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
             except DemosError:
                 reason = "damaged JSON, or no valid _index"
                 context.report("left out", reason, f"{name}, line {number}")
+    if sorted(found) != list(found):
+        text = "The _index does not always rise: the records are read in its order."
+        context.report("warning", text)
     last = max([*found, catalogs.current_index - 1])
     if (missing := last + 1 - len(found)) > 0:
         context.report("note", f"{missing} of the records 0 to {last} are in no catalog.")
