@@ -1,7 +1,7 @@
-"""Visuals of the finger: its anatomy, and a legend, paths and trails in frames.
+"""Visuals of the finger: bones, skin and tendons, and a legend, paths and trails in frames.
 
-The anatomy, bones, skin, and tendons on their anatomical routes, has no mass, collisions or forces;
-the finger is moved by the fixed tendons of `shapechanger.finger.model`.
+Bones, skin and visible tendons have no mass, collisions or forces. The fixed tendons of
+`shapechanger.finger.model` move the finger.
 """
 
 from __future__ import annotations
@@ -23,9 +23,11 @@ _HAND: Final = "hand"
 
 
 TendonRoute = tuple[tuple[str, float, float, float] | str, ...]
-"""Points that a tendon passes, from the wrist on: the name of a bone and x, y and z, mm, in its own
-axes (x along it from its joint, y radial, z dorsal); or "MCP", "PIP" or "DIP", the joint around
-whose back the tendon wraps when it bends."""
+"""Points that a tendon passes, from the wrist to its end.
+
+A point is the name of a bone with x, y and z, mm, in the bone's frame: x along the bone from its
+joint, y radial, z dorsal. "MCP", "PIP" or "DIP" is a joint whose back the tendon wraps around.
+"""
 
 
 def _on(body: str, *points: tuple[float, float, float]) -> TendonRoute:
@@ -49,7 +51,7 @@ def _extensor(y: float) -> TendonRoute:
 
 
 def _to_the_hood(side: float) -> TendonRoute:
-    """Route from the side of the proximal phalanx into the hood, and on as its lateral band."""
+    """Route from the side of the proximal phalanx into the hood, and along its lateral band."""
     return (
         *_on(_P, (9.0, 7.0 * side, -3.5), (30.0, 5.0 * side, 3.6)),
         "PIP",
@@ -62,7 +64,7 @@ def _to_the_hood(side: float) -> TendonRoute:
 # Sides and order follow anatomical atlases; the positions are chosen for visibility.
 _TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
     {
-        # Below FDS up to the knuckle, then through its slips, to the base of the distal phalanx.
+        # FDP runs deep to FDS, then between the slips of FDS to the base of the distal phalanx.
         "FDP": (
             (
                 *_on(_HAND, (-58.0, 0.6, -6.6), (-11.0, 0.0, -7.0)),
@@ -71,8 +73,8 @@ _TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
                 *_on(_D, (6.0, 0.0, -3.4)),
             ),
         ),
-        # Nearest to the palm; it splits around FDP, and each slip ends at a side of the middle
-        # phalanx.
+        # FDS is nearest to the palm. It splits around FDP, and each slip ends at one side of the
+        # middle phalanx.
         "FDS": tuple(
             (
                 *_on(_HAND, (-58.0, -0.6, -8.8), (-11.0, 0.0, -9.2)),
@@ -81,12 +83,12 @@ _TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
             )
             for side in (1.0, -1.0)
         ),
-        # On the ulnar side of EDC.
+        # EIP runs on the ulnar side of EDC.
         "EIP": (_extensor(-1.5),),
         "EDC": (_extensor(1.5),),
-        # From the tendon of FDP in the palm, radially and palmar of the knuckle's axis.
+        # LUM runs from the tendon of FDP in the palm, radially and palmar of the knuckle's axis.
         "LUM": ((*_on(_HAND, (-40.0, 1.6, -6.6), (-10.0, 6.2, -6.0)), *_to_the_hood(1.0)),),
-        # From the back of the web between thumb and finger to the base of the proximal phalanx.
+        # DI runs from the web between thumb and finger to the base of the proximal phalanx.
         "DI": (
             (
                 *_on(_HAND, (-42.0, 5.0, 1.5), (-9.0, 7.6, -1.0)),
@@ -116,7 +118,7 @@ TENDON_COLOURS: Final = {
 """Red, green and blue of each tendon, 0 to 1."""
 
 THINNEST_M: Final = 0.0007
-"""Radius of a tendon without tension, m; chosen, like all numbers here."""
+"""Radius of a tendon without tension, m, chosen like all sizes and colours in this file."""
 THICKEST_M: Final = 0.0016
 """Radius of a tendon at its largest tension, m."""
 
@@ -155,7 +157,7 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
     spec.visual.headlight.ambient[:] = (0.45, 0.45, 0.45)
     spec.visual.headlight.diffuse[:] = (0.35, 0.35, 0.35)
     spec.visual.headlight.specular[:] = (0.1, 0.1, 0.1)
-    # From above and in front of the finger, so that it has a bright and a dark side.
+    # The lamp shines from above and in front, so that the finger has a bright and a dark side.
     spec.worldbody.add_light(
         name="lamp",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
@@ -165,7 +167,7 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
         specular=[0.1, 0.1, 0.1],
         castshadow=False,
     )
-    # The hand's geom moves to a body, which cameras can follow.
+    # Cameras can follow only a body, so the hand's geom moves to a new body.
     plain = spec.geom(METACARPAL)
     shape: dict[str, Any] = {"fromto": plain.fromto.copy(), "size": plain.size.copy()}
     spec.delete(plain)
@@ -175,8 +177,7 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
     bodies = {_HAND: hand} | {name: spec.body(name) for name in PHALANGES}
     for name in PHALANGES:
         spec.geom(name).rgba = _SKIN
-    # Each bone spans from its joint to the next; the last one ends below the flesh of the
-    # fingertip.
+    # Each bone reaches from its joint to the next. The last bone ends inside the fingertip.
     spans = [(float(spec.geom(METACARPAL).fromto[0]), 0.0)]
     for length, head in zip(PHALANX_LENGTH_M, _HEADS, strict=False):
         spans.append((head + _CARTILAGE, length))
@@ -222,7 +223,7 @@ def _add_back(body: mujoco.MjsBody, joint: str, x: float, radius: float) -> None
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,
         size=[radius + THINNEST_M, 0.010, 0.0],
         pos=[x, 0.0, 0.0],
-        quat=[1.0, 1.0, 0.0, 0.0],  # Its axis from z to y.
+        quat=[1.0, 1.0, 0.0, 0.0],  # Turns the axis of the cylinder from z to y.
         mass=0.0,
         group=_HIDDEN,
     )
@@ -246,11 +247,10 @@ def _add_course(
         tendon.wrap_site(site.name)
 
 
-# Narrower frames have no legend, pixels: its names would not be legible.
+# Width of the narrowest frame with a legend, pixels. The names would be illegible in others.
 _NARROWEST: Final = 240
 _SMALLEST_FONT: Final = 9.0
-# Height of the font, divided by the height of the frame. With the bars, the legend stays above a
-# raised finger.
+# Height of the font, divided by the height of the frame. The legend stays above a raised finger.
 _FONT: Final = 1.0 / 36.0
 _INK: Final = (40, 40, 40)
 _EMPTY: Final = (205, 210, 218)
@@ -259,7 +259,7 @@ _EMPTY: Final = (205, 210, 218)
 def tendon_legend(frame: NDArray[np.uint8], pulled: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return a frame with each tendon's name, colour and tension along its top.
 
-    Bars show `pulled`, the tensions over the largest, 0 to 1, (7,).
+    `pulled` has the length of each tendon's bar: its tension divided by its largest, 0 to 1, (7,).
     """
     height, width = frame.shape[:2]
     if width < _NARROWEST:

@@ -37,9 +37,9 @@ class VehicleModel:
 
     Attributes:
         name: Name, such as "car".
-        drives: Alternative sets of parts that drive and steer it; a robot has exactly one set.
+        drives: Alternative sets of parts that drive and steer; a robot has exactly one set.
         optional_parts: Further parts that a robot may have; they have no effect in simulation.
-        length_m: Length from bumper to bumper, trailer included.
+        length_m: Length from bumper to bumper, including a trailer.
         width_m: Largest width.
         nose_m: Distance from the origin to the front bumper.
         floats: Whether it moves on water.
@@ -48,8 +48,8 @@ class VehicleModel:
         turning_radius_m: Radius of the origin's path at full lock; 0 if it turns on the spot.
         gear: Turns of `HOBBY_MOTOR` for each turn of the shaft that it drives.
         efficiency: Share of the torque that the gear passes on.
-        lock_deg: Angle at full steering, of a rudder, or of a wheel in the middle of the front
-            axle; 0 for a vehicle without steering.
+        lock_deg: Angle at full steering of the rudder, or of a wheel in the middle of the front
+            axle, degrees; 0 for a vehicle that has neither.
     """
 
     name: str
@@ -68,11 +68,11 @@ class VehicleModel:
 
     @property
     def motor(self) -> DcMotor:
-        """Motor of each of its driving parts, with its gear."""
+        """Motor, with its gear, of each driving part."""
         return HOBBY_MOTOR.geared(self.gear, self.efficiency)
 
     def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> BoundVehicle:
-        """Find its joints and motors in a compiled model."""
+        """Return the vehicle in a simulation of `model` with the state `data`."""
         kind = Floating if self.floats else Rolling
         return kind(model, data, self.motor, math.radians(self.lock_deg))
 
@@ -98,8 +98,8 @@ def add_vehicle(
 ) -> VehicleModel:
     """Add a vehicle at the origin of a model, and set the step and solver options that it needs.
 
-    Names of its elements start with "vehicle/". `light` is the red, green and blue of the light on
-    it, each 0 to 1, for views from outside.
+    Names of the vehicle's elements start with "vehicle/". `light` is the red, green and blue of the
+    light on the vehicle in views from outside, each 0 to 1.
     """
     model = vehicle_model(name)
     vehicle = mujoco.MjSpec.from_file(str(_FOLDER / "models" / f"{name}.xml"))
@@ -115,14 +115,14 @@ def add_vehicle(
     # vehicle at rest from creeping.
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
-    # Poses of what never moves are then computed once, not in each step. The vehicle itself never
-    # sleeps, so that its motion is the same.
+    # With sleep, MuJoCo computes the poses of static bodies once instead of in each step. The
+    # vehicle never sleeps, so its motion is the same.
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     return model
 
 
 def require_fit(name: str, parts: Collection[str]) -> None:
-    """Check that a robot's parts fit a vehicle."""
+    """Raise a `ProfileError` unless a robot's parts are exactly one drive of the vehicle."""
     model = vehicle_model(name)
     driving = frozenset(parts) - model.optional_parts
     if driving not in model.drives:

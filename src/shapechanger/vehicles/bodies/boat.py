@@ -1,10 +1,10 @@
-"""Boat: a hull with a central propeller and a rudder, and twin propellers as an alternative.
+"""Boat: a hull with a central propeller, a rudder and twin propellers.
 
-A robot drives either the central propeller and the rudder, or the twins; parts that it does not
-drive stay still and have no effect.
+A robot drives either the central propeller and the rudder, or the twin propellers. Parts that the
+robot does not drive stay still and have no effect.
 
-Surge u points ahead and sway v to the left; the rate of turn r is counter-clockwise. All are
-relative to the water. X and Y are forces, N, and N is the moment about the middle, N·m. Names
+Surge u points ahead and sway v to the left, relative to the water. The rate of turn r is
+counter-clockwise. X and Y are forces, N, and N is the moment about the middle, N·m. Names
 follow T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., Wiley 2021.
 """
 
@@ -20,8 +20,8 @@ from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs
 from shapechanger.vehicles.bodies.parts import DcMotor
 
 _WATER_DENSITY: Final = 1000.0  # kg/m3, fresh
-# Share of its full speed that the wash has reached at the rudder: 0.6 for hulls in H. Yasukawa and
-# Y. Yoshimura, Introduction of MMG standard method, J. Mar. Sci. Technol. 20 (2015).
+# Share of the speed gained behind a propeller that the water has gained at the rudder: 0.6 in H.
+# Yasukawa, Y. Yoshimura, Introduction of MMG standard method, J. Mar. Sci. Technol. 20 (2015).
 _CONTRACTED: Final = 0.6
 
 
@@ -35,9 +35,9 @@ class Propeller:
         zero_thrust_j: J at which the thrust is 0.
         torque: Torque coefficient at J = 0.
         zero_torque_j: J at which the torque is 0.
-        astern: Share of thrust and torque when turning backwards.
-        wake: Speed of the water at the propeller, as a share of the boat's.
-        thrust_deduction: Share of the thrust that is lost, since the propeller sucks at the hull.
+        astern: Factor on thrust and torque when turning backwards.
+        wake: Speed of the water at the propeller, divided by the speed of the boat.
+        thrust_deduction: Share of the thrust that is lost, because it sucks water from the hull.
     """
 
     diameter: float
@@ -50,7 +50,7 @@ class Propeller:
     thrust_deduction: float
 
     def loads(self, n: float, u: float) -> tuple[float, float]:
-        """Thrust, N, and torque, N·m, at turns per second and a speed through the water, m/s."""
+        """Thrust, N, and torque, N·m, at `n` turns/s and a speed `u` through the water, m/s."""
         inflow = self.wake * u / self.diameter
         common = _WATER_DENSITY * self.diameter**4 * abs(n) * (self.astern if n < 0.0 else 1.0)
         thrust = common * self.thrust * (n - inflow / self.zero_thrust_j)
@@ -58,7 +58,7 @@ class Propeller:
         return thrust, torque
 
     def wash(self, thrust: float, u: float) -> float:
-        """Speed of the water behind the propeller at a thrust, N, by momentum theory, m/s."""
+        """Speed of the water at the rudder, m/s, from the thrust, N, by momentum theory."""
         ahead = self.wake * u
         if thrust <= 0.0 or ahead < 0.0:
             return ahead
@@ -83,7 +83,7 @@ class Fin:
 
     @property
     def lift(self) -> float:
-        """Normal force over the sine of the angle and the square of the speed, N·s2/m2.
+        """Normal force divided by sin(angle of attack) and by the squared speed, N·s2/m2.
 
         The slope 6.13 Λ / (Λ + 2.25) of a plate with the aspect ratio Λ is Fujii's; see Yasukawa
         and Yoshimura (2015).
@@ -95,7 +95,8 @@ class Fin:
     def force(self, flow: float, v: float, r: float, angle: float) -> tuple[float, float, float]:
         """Forces X and Y, N, and moment N, N·m, in a flow from ahead, m/s.
 
-        `angle` of the blade is in rad, counter-clockwise; a negative one turns the boat left.
+        `angle` is the angle of the blade, rad, counter-clockwise. A negative angle turns the boat
+        left.
         """
         aside = v + self.x * r
         sine, cosine = math.sin(angle), math.cos(angle)
@@ -110,22 +111,22 @@ _DRAUGHT: Final = 0.04  # m
 _BLOCK: Final = 0.55  # Block coefficient, usual for workboats.
 _MASS: Final = _WATER_DENSITY * _BLOCK * _LENGTH * _WIDTH * _DRAUGHT
 
-# Radius of gyration in yaw over length: 0.25, the usual estimate for ships (Fossen, chapter 6).
+# The radius of gyration in yaw is 0.25 lengths, the usual estimate for ships (Fossen, chapter 6).
 _INERTIA: Final = _MASS * (0.25 * _LENGTH) ** 2
-# Mass and inertia with the water that accelerates with the hull: ahead, to the side and in yaw.
-# The shares were measured for CyberShip II, a model of 1.26 m: R. Skjetne, T. I. Fossen and P.
-# Kokotović, Adaptive maneuvering, Automatica 41 (2005), table of parameters.
+# Mass and inertia including added mass, the water that accelerates with the hull. The ratios were
+# measured for CyberShip II, a model of 1.26 m: R. Skjetne, T. I. Fossen and P. Kokotović, Adaptive
+# maneuvering, Automatica 41 (2005), table of parameters.
 _ALONG: Final = _MASS + 2.0 / 23.8 * _MASS  # kg
 _ACROSS: Final = _MASS + 10.0 / 23.8 * _MASS  # kg
 _YAW: Final = _INERTIA + 1.0 / 1.76 * _INERTIA  # kg·m2
-# Wetted surface and drag coefficient at a Froude number near 0.5: estimates. Friction alone gives
-# about 0.005 by the ITTC 1957 line, waves the rest.
+# Wetted surface and drag coefficient at a Froude number near 0.5 are estimates. Of the coefficient,
+# about 0.005 is friction (ITTC 1957 line) and the rest is wave drag.
 _WETTED: Final = 0.8 * _LENGTH * (_WIDTH + 2.0 * _DRAUGHT)  # m2
 _SURGE_COEFFICIENT: Final = 0.0135
 # Cross-flow drag of a hull with rounded bilges, an estimate after Hoerner in Fossen's chapter 6.
 _CROSSFLOW_COEFFICIENT: Final = 0.7
-# Quadratic drag ahead and to the side, N·s2/m2, and of a turn, N·m·s2: cross-flow drag integrated
-# over the length, for a turn about the middle.
+# Quadratic drag ahead and to the side, N·s2/m2, and of a turn, N·m·s2. For a turn about the middle,
+# cross-flow drag is integrated along the hull.
 _SURGE_2: Final = 0.5 * _WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT
 _SWAY_2: Final = 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH
 _YAW_2: Final = 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH**4 / 32.0
@@ -133,9 +134,9 @@ _YAW_2: Final = 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENG
 _SURGE_1: Final = 0.1 * 0.5 * _WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT  # N·s/m
 _SWAY_1: Final = 0.1 * 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH  # N·s/m
 _YAW_1: Final = 0.5 * _YAW_2  # N·m·s
-# A hull with drift acts as a low wing, with forces times speed and sway, N·s2/m2, and moments times
-# speed and rate of turn, N·s2. Clarke, Gedling and Hine's formulas (1983; in Fossen, chapter 6) for
-# the derivatives Y_v and N_r, from length L, beam B, draught T and block.
+# A drifting hull acts as a low wing. Its force is `_SWAY_LIFT`, N·s2/m2, times speed and sway; its
+# moment is `_YAW_LIFT`, N·s2, times speed and rate of turn. Clarke, Gedling and Hine (1983; in
+# Fossen, chapter 6) give Y_v and N_r from length, beam, draught and block coefficient.
 _WING: Final = math.pi * (_DRAUGHT / _LENGTH) ** 2
 _SWAY_WING: Final = _WING * (1.0 + 0.4 * _BLOCK * _WIDTH / _DRAUGHT)
 _YAW_WING: Final = _WING * (0.25 + 0.039 * _WIDTH / _DRAUGHT - 0.56 * _WIDTH / _LENGTH)
@@ -143,7 +144,7 @@ _SWAY_LIFT: Final = 0.5 * _WATER_DENSITY * _LENGTH**2 * _SWAY_WING
 _YAW_LIFT: Final = 0.5 * _WATER_DENSITY * _LENGTH**4 * _YAW_WING
 
 # Linear fits by eye to the open-water curves of a Wageningen B3-50 propeller with a pitch of 0.9
-# diameters (M. Oosterveld and P. van Oossanen 1975). Astern about half is left: an estimate.
+# diameters (M. Oosterveld and P. van Oossanen 1975). The loss of half astern is an estimate.
 _PROPELLER: Final = Propeller(
     diameter=0.035, thrust=0.38, zero_thrust_j=0.95, torque=0.045, zero_torque_j=1.1, astern=0.5,
     wake=0.85, thrust_deduction=0.1,
@@ -214,7 +215,7 @@ class Floating(BoundVehicle):
         return self._log_m
 
     def _state(self) -> tuple[float, float, float, float, float, float]:
-        """Heading, its cosine and sine, speeds along the world's axes, and rate of turn."""
+        """Heading, rad, its cosine and sine, velocity in the world, m/s, and rate of turn, rad/s."""
         heading = float(self._qpos[self._qpos0 + 2])
         vx, vy, r = self._qvel[self._qvel0 : self._qvel0 + 3].tolist()
         return heading, math.cos(heading), math.sin(heading), vx, vy, r
@@ -225,7 +226,7 @@ class Floating(BoundVehicle):
         wx, wy = vx - self._flow[0], vy - self._flow[1]
         u, v = wx * cosine + wy * sine, wy * cosine - wx * sine
         now_s = float(self._data.time)
-        # Whole steps, so that the same drive is as long at any time.
+        # Whole steps: the same drive is equally long at any time, in spite of rounding.
         steps = round((now_s - self._logged_s) / self._dt)
         self._log_m += u * self._dt * steps
         self._logged_s = now_s
@@ -242,15 +243,15 @@ class Floating(BoundVehicle):
             x += push
             n -= push * aside
             if part == "propeller" and thrust > 0.0 and u >= 0.0:
-                # The wash meets a part of the rudder. Squares of speeds are averaged over its
-                # height, because forces are proportional to them.
+                # The wash meets a part of the rudder. Forces are proportional to squared speeds,
+                # so squared speeds are averaged over the height of the rudder.
                 wet = min(1.0, propeller.diameter / _RUDDER.height)
                 flow = math.sqrt(wet * propeller.wash(thrust, u) ** 2 + (1.0 - wet) * u * u)
         if has_rudder:
             rx, ry, rn = _RUDDER.force(flow, v, r, float(self._qpos[self._rudder]))
             x, y, n = x + rx, y + ry, n + rn
-        # The manoeuvring equations in three degrees of freedom (Fossen, chapter 6) with the
-        # Coriolis terms of different masses along and across.
+        # The manoeuvring equations in three degrees of freedom (Fossen, chapter 6). The mass ahead
+        # differs from the mass to the side, which gives Coriolis terms.
         pace = math.hypot(u, v)
         x += _ACROSS * v * r - (_SURGE_1 + _SURGE_2 * abs(u)) * u
         y += -_ALONG * u * r - (_SWAY_1 + _SWAY_2 * abs(v) + _SWAY_LIFT * pace) * v

@@ -1,4 +1,4 @@
-"""Vehicles in a running simulation: what all have, those on land, and their contacts."""
+"""Vehicles in a running simulation: all vehicles, land vehicles, and contacts."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ import numpy as np
 from shapechanger.vehicles.bodies.parts import DcMotor
 
 Outputs = Mapping[str, float | None]
-"""Output of each part, from -1 to 1; None for a motor that is disconnected.
+"""Output of each part, from -1 to 1, or None.
 
-For a motor it is a share of the battery's voltage, for a servo a share of its travel. Steering
-and rudder are negative to the left. A servo without pulses, None, keeps its last angle.
+An output of a motor is a share of the battery's voltage; an output of a servo is a share of its
+travel, negative to the left. None disconnects a motor, and lets a servo keep its last angle.
 """
 
 
@@ -45,9 +45,9 @@ class BoundVehicle(ABC):
 
     Args:
         model: Compiled model with the vehicle.
-        data: Its state.
+        data: State of the model.
         motor: Motor of each tendon; a tendon is named "vehicle/" plus the part that it drives.
-        full_lock: Angle of its wheels or its rudder at a steering of 1, rad.
+        full_lock: Angle of the front wheels or the rudder at a steering of 1, rad.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class BoundVehicle(ABC):
         mujoco.mj_forward(self._model, self._data)
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
-        """Apply outputs and, to a boat, the forces of the water; call it every 10 ms."""
+        """Apply the outputs, and the forces of the water to a boat; call this every 10 ms."""
         self._open = frozenset([part for part in self._shafts if outputs.get(part, 0.0) is None])
         for part, (actuator, tendon) in self._shafts.items():
             value = outputs.get(part, 0.0)
@@ -105,7 +105,7 @@ class BoundVehicle(ABC):
 
     @abstractmethod
     def travelled_m(self) -> float:
-        """Distance that the wheels rolled since `place`, or that a boat moved through the water."""
+        """Distance rolled, or moved through the water by a boat, since `place`, m."""
 
     def current_a(self) -> float:
         """Current of the motors, A, >= 0; a braking motor draws none."""
@@ -181,15 +181,15 @@ BUMPER_SPREAD: Final = math.radians(60.0)
 """Largest bearing, rad, from the middle of the vehicle, at which a contact presses the bumper."""
 
 APART_S: Final = 0.5
-"""Contacts that follow one another within this time, s, belong to the same collision."""
+"""Longest time between two contacts of the same collision, s."""
 
 
 class ContactTracker:
     """Tracks contacts of a vehicle with walls and obstacles.
 
     Args:
-        model: Model whose vehicle geoms are named "vehicle/...", and its walls and obstacles
-            "world/wall/..." and "world/thing/...".
+        model: Compiled model. Geoms of the vehicle are named "vehicle/...", walls "world/wall..."
+            and obstacles "world/thing...".
 
     Attributes:
         collisions: Number of collisions since `reset`.
@@ -215,7 +215,7 @@ class ContactTracker:
         self._since_s = math.inf
 
     def follow(self, data: mujoco.MjData, motion: Motion, dt_s: float) -> None:
-        """Update from the contacts of a simulation step of this length, s."""
+        """Update from the contacts after `dt_s` seconds of simulation."""
         self._since_s += dt_s
         self.bumped = self.touches = False
         if data.ncon == 0:

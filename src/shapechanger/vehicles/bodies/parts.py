@@ -12,7 +12,8 @@ import numpy as np
 from shapechanger.errors import WorldError
 
 PI_CAMERA_FOVY_DEG: Final = 48.8
-"""Raspberry Pi camera module 2: https://www.raspberrypi.com/documentation/accessories/camera.html"""
+"""Vertical field of view of the Raspberry Pi camera module 2, degrees:
+https://www.raspberrypi.com/documentation/accessories/camera.html."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,16 +46,17 @@ class CameraMount:
 def aim_camera(camera: mujoco.MjsCamera, mount: CameraMount) -> None:
     """Change the pose and the field of view of a camera."""
     s, c = math.sin(mount.pitch_rad), math.cos(mount.pitch_rad)
-    # The columns are its axes: x to the right, y up, and z backwards, against its view.
+    # The columns are the camera's axes: x to the right, y up, and z opposite to its view.
     axes = np.array([[0.0, s, -c], [-1.0, 0.0, 0.0], [0.0, c, s]])
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, axes.ravel())
     camera.pos, camera.quat, camera.fovy = [mount.x, mount.y, mount.z], quat, mount.fovy_deg
 
 
-# Largest errors of a screwed, printed mount: estimates.
+# Estimates of the largest errors of a printed mount that is fixed with screws.
 _HEIGHT_M, _SIDE_M, _ANGLE_RAD = 0.015, 0.01, math.radians(3.0)
-_LOWEST_M, _FARTHEST_M = 0.01, 1.0  # Above the floor, and still on the vehicle.
+# Least height above the floor and largest coordinate in the vehicle's frame, m.
+_LOWEST_M, _FARTHEST_M = 0.01, 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +67,8 @@ class CameraJitter:
         up_m: Offset upwards, m.
         left_m: Offset to the left, m.
         roll_rad: Rotation about the line of sight; positive to the right.
-        pitch_rad: Positive down.
-        yaw_rad: Positive to the left.
+        pitch_rad: Rotation in pitch, positive down.
+        yaw_rad: Rotation in yaw, positive to the left.
     """
 
     up_m: float = 0.0
@@ -84,13 +86,13 @@ class CameraJitter:
 
 
 def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> None:
-    """Add an error to the pose of a camera; a refused error has no effect."""
+    """Add an error to the pose of a camera, or raise a `WorldError` before any change."""
     place = model.camera(camera)
     position = place.pos + np.array((0.0, jitter.left_m, jitter.up_m))
     turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad
     finite = np.isfinite([*position, *turns]).all()
     if not finite or position[2] < _LOWEST_M or np.abs(position).max() > _FARTHEST_M:
-        raise WorldError(f"The camera would be off its vehicle or in the floor with {jitter}.")
+        raise WorldError(f"The camera must be above the floor and on its vehicle, got {jitter}.")
     place.pos[:] = position
     # A MuJoCo camera looks along -z of its frame, with x to the right and y up.
     turned = np.empty(4)
@@ -114,10 +116,10 @@ _RPM: Final = 2.0 * math.pi / 60.0  # rad/s
 
 @dataclass(frozen=True, slots=True)
 class DcMotor:
-    """A brushed DC motor with a gear, seen from the output shaft.
+    """A brushed DC motor with a gear; speeds and torques are at the output shaft.
 
-    voltage = resistance * current + volts_per_speed * speed. Losses of the gear are part of
-    `torque_per_current`; dry friction is part of `free_a` and makes the dead band.
+    voltage = resistance * current + volts_per_speed * speed. `torque_per_current` includes losses
+    of the gear. `free_a` includes dry friction, which causes the dead band.
 
     Attributes:
         resistance: Resistance of the winding, Ohm.
@@ -144,7 +146,7 @@ class DcMotor:
         return self.torque_per_current * self.volts_per_speed / self.resistance
 
     def geared(self, ratio: float, efficiency: float = 1.0) -> DcMotor:
-        """The motor with one more gear stage: turns of this shaft per turn of the next."""
+        """The motor with one more gear stage; `ratio` is turns of this shaft per turn of the next."""
         return replace(
             self,
             volts_per_speed=self.volts_per_speed * ratio,
@@ -153,15 +155,12 @@ class DcMotor:
         )
 
     def amperes(self, volts: float, speed: float) -> float:
-        """Current from the battery, A, at a voltage and a speed of the shaft, rad/s.
-
-        It is 0 while the motor brakes through its bridge.
-        """
+        """Current from the battery, A, at a voltage and a shaft speed, rad/s; 0 while braking."""
         current = (volts - self.volts_per_speed * speed) / self.resistance
         return max(0.0, current if volts > 0.0 else -current) if volts else 0.0
 
     def add(self, spec: mujoco.MjSpec) -> None:
-        """Let a motor of this kind turn each tendon of a vehicle, controlled by a voltage.
+        """Set up the actuator of each tendon as a motor of this kind, controlled by its voltage.
 
         MuJoCo's affine actuator implements the motor's equation:
         https://mujoco.readthedocs.io/en/stable/XMLreference.html#actuator-general
@@ -186,21 +185,21 @@ HOBBY_MOTOR: Final = DcMotor(
     volts_per_speed=(6.0 - 0.5 * 1.0) / (2200.0 * _RPM),
     torque_per_current=1.2 * _KGF_CM / 6.0,
     free_a=0.5,
-    # An estimate: a rotor of 20 g and 8 mm radius, times the gear squared.
+    # An estimate: the inertia of a rotor of 20 g and 8 mm radius, times the squared gear ratio.
     rotor_inertia=0.5 * 0.020 * 0.008**2 * 4.4**2,
 )
 """Motor of all vehicles here, each with a further gear stage."""
 
-# Hitec HS-311 at 4.8 V: 3.0 kgf·cm, 60 degrees in 0.19 s, by its data sheet. The smallest error of
-# its angle at which it gives its largest torque is an estimate; cheap ones hold to a few degrees.
+# Hitec HS-311 at 4.8 V, by its data sheet: 3.0 kgf·cm, 60 degrees in 0.19 s. The smallest angle
+# error at which it gives its full torque is an estimate; cheap servos hold to a few degrees.
 _STALL_TORQUE, _FREE_RATE = 3.0 * _KGF_CM, math.radians(60.0) / 0.19  # N·m and rad/s.
 _ERROR_AT_STALL: Final = math.radians(4.0)
 
 
 def add_servo(spec: mujoco.MjSpec) -> None:
-    """Let one hobby servo turn all steering joints of a vehicle, controlled by their angles, rad.
+    """Set up the actuators of the steering joints as one hobby servo, controlled by angles, rad.
 
-    It turns to an angle at a limited speed and holds it: at full torque it turns at its free rate.
+    The servo turns at a limited speed: without load, its full torque gives its free rate.
     """
     joints = [joint for joint in spec.joints if joint.classname.name == "steering"]
     for joint in joints:

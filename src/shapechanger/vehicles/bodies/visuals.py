@@ -13,21 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Faces = NDArray[np.float64]
-"""Corners of faces, (n, 4, 3), m, counter-clockwise seen from outside; the last corner of a
-triangle is there twice."""
+"""Corners of faces, m, (n, 4, 3), counter-clockwise seen from outside. A triangle repeats its last
+corner."""
 
 OWN_VIEW: Final = 1
-"""Group of the geoms that only the vehicle's own camera sees.
-
-Policies are trained on its images, so these simple shapes stay as they are.
-"""
+"""Group of the geoms that only the vehicle's own camera sees."""
 
 OUTSIDE_VIEW: Final = 2
 """Group of the geoms that are only seen from outside."""
 
 
 Solids = tuple[Faces, NDArray[np.float64]]
-"""Faces, and texture coordinates of their corners, (n, 4, 2 or 3), which may be empty."""
+"""Faces, and the texture coordinates of their corners: (n, 4, 2 or 3), or an empty array."""
 
 
 @functools.cache
@@ -64,27 +61,26 @@ _COLOURS: Final = tomllib.loads(Path(__file__).with_name("colours.toml").read_te
 
 
 def normals(faces: Faces) -> NDArray[np.float64]:
-    """Unit vectors outwards, (n, 3)."""
+    """Outward unit normal of each face, (n, 3)."""
     across = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
     return across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
 
 
 def shading(faces: Faces) -> NDArray[np.float64]:
-    """Brightness of each face under an open sky, 0 to 1, (n,): the top is brightest."""
+    """Brightness of each face under an open sky, 0 to 1, (n,); top faces are brightest."""
     x, y, up = normals(faces).T
     light = 0.72 + np.where(up > 0.0, 0.28, 0.4) * up
     return np.clip(light + (0.07 * x + 0.1 * y) * (1.0 - np.abs(up)), 0.05, 1.0)
 
 
-# A shadow is a stack of layers, each larger than the next, so that its edge is soft.
+# A shadow is a stack of ever smaller layers, so that its edge is soft.
 _LAYERS, _LAYER_DARKNESS, _LAYER_RISE_M = 18, 0.055, 0.0002
 
 
 def dress(spec: mujoco.MjSpec, vehicle: str, light: ArrayLike) -> None:
-    """Add everything of a vehicle that is seen from outside.
+    """Add the shapes of a vehicle that are seen from outside: meshes, reflections and shadows.
 
-    That is the object of each body, with its reflection in a glossy ground, its shadow, and tyres
-    and rims of wheels. `light` is the red, green and blue of the light on them, each 0 to 1.
+    `light` is the red, green and blue of the light on the vehicle, each 0 to 1.
     """
     objects = read_obj(_MESHES / f"{vehicle}.obj")
     tints = {colour: np.asarray(light, float) * rgb for colour, rgb in _COLOURS.items()}
@@ -104,10 +100,10 @@ def dress(spec: mujoco.MjSpec, vehicle: str, light: ArrayLike) -> None:
         if body.name.endswith(" wheel"):
             for colour, (faces, _) in objects["wheel"].items():
                 name = f"{colour} of wheels"
-                # Equally bright in any direction.
+                # All faces of a wheel are equally bright, so that rolling does not change them.
                 material = _material(spec, f"{colour}/even", tints[colour], 0.85)
                 _add_shape(spec, body, name, faces, None, material)
-                # Its reflection does not turn.
+                # The reflection of a wheel belongs to the parent body, so it does not turn.
                 mirrored = body.pos - (0.0, 0.0, 2.0 * body.geoms[0].size[0])
                 _add_shape(spec, body.parent, name, faces, None, material, mirrored)
 
@@ -131,9 +127,9 @@ def _add_shape(
     material: str,
     pos: ArrayLike = (0.0, 0.0, 0.0),
 ) -> None:
-    """Add a visual mesh without mass and collisions, from a mesh of that name if there is one.
+    """Add a geom without mass or collisions, and its mesh unless there is one of that name.
 
-    `brightness` of each face is 0 to 1, (n,). Without it, rolling does not change the normals.
+    `brightness` of each face is 0 to 1, (n,). None is for shapes that may roll.
     """
     if spec.mesh(name) is None:
         triangles = faces[:, [[0, 1, 2], [0, 2, 3]]]
@@ -142,8 +138,7 @@ def _add_shape(
         points = triangles[full].reshape(-1, 3)
         given = np.zeros(len(faces)) if brightness is None else brightness
         light = np.repeat(np.broadcast_to(given[:, None], full.shape)[full], 3)
-        # Texture coordinates are unused, but without them MuJoCo draws the faces with their own
-        # normals.
+        # The texture coordinates are unused. Without them MuJoCo would ignore the given normals.
         uvs = np.zeros((len(points), 2))
         add_lit_mesh(spec, name, points, light, uvs, np.arange(len(points)), axis=1)
     body.add_geom(
@@ -162,11 +157,11 @@ def add_lit_mesh(
     *,
     axis: int,
 ) -> None:
-    """Add a mesh with a light, 0 to 1, at each of its points, m.
+    """Add a mesh with a brightness, 0 to 1, at each of its points, m.
 
-    MuJoCo has no brightness per vertex, but a normal. Courses have one light, which shines straight
-    up, so the normals are chosen for the brightness that they give. They lean along `axis`, 0 or 1:
-    along y, so that rolling does not change the normals of a wheel.
+    MuJoCo vertices have normals, but no brightness. Courses have one light, which shines straight
+    up, so each normal is tilted until the light gives the wanted brightness. Normals tilt along
+    `axis`, 0 (x) or 1 (y). A wheel rolls about y, so rolling does not change normals along y.
     """
     normals = np.zeros((len(points), 3))
     normals[:, axis], normals[:, 2] = np.sqrt(1.0 - lights * lights), -lights

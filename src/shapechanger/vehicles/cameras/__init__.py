@@ -1,1 +1,1 @@
-"""Cameras: images of the simulation, faults of cameras, and one view for all cameras."""
+"""Cameras: simulated images, simulated camera faults, and the view that all vehicles share."""

@@ -1,8 +1,8 @@
 """Cameras on board and outside, and faults of cameras.
 
-Cameras render offscreen, without MuJoCo's shadows and reflections. Faults, of bad light and a bad
-lens, are pure functions on images, shape (H, W, 3), uint8, of any size: they test how well policies
-generalize to other images, and never change the world.
+Cameras render offscreen, without MuJoCo's shadows and reflections. Faults imitate bad light and a
+bad lens, and test how well policies generalize to other images. They are pure functions on images
+of any size, uint8, (H, W, 3).
 """
 
 from __future__ import annotations
@@ -26,23 +26,26 @@ from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
 _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
 _MOST_GEOMS: Final = 2000
 _BEHIND_ALL_M: Final = 1000.0
-# Ids of the processes that have rendered. A fork of one would deadlock on threads that it lacks.
+# Ids of the processes that have rendered. A fork does not copy threads, so rendering in a fork of
+# one of these processes would deadlock.
 _drawing: set[int] = set()
-# Pixels of an outside view are the means of squares this wide, so that edges are smooth.
+# A pixel of an outside view is the mean of a square this many pixels wide, so edges are smooth.
 _SUPERSAMPLED: Final = 2
 _LARGEST: Final = 4096  # Width and height; software renderers draw no larger images.
 
 
 class _Renderer:
-    """Renders views of models, whose textures are loaded for their first image after another's.
+    """Renders views of models; an image of another model than the last loads its textures.
 
-    The OpenGL context is opened for the first image, so that a process that has only built a
-    camera, such as the parent of an `AsyncVectorEnv`, can be forked.
+    The OpenGL context is opened for the first image. A process that has only built a camera, such
+    as the parent of an `AsyncVectorEnv`, can therefore be forked.
     """
 
     def __init__(self, size: tuple[int, int], hidden: int, supersampled: int = 1) -> None:
         if min(size) < 1:
-            raise RenderError(f"An image cannot be {size[0]} x {size[1]} pixels.")
+            raise RenderError(
+                f"An image must have at least 1 x 1 pixels, got {size[0]} x {size[1]}."
+            )
         self._width, self._height = (supersampled * side for side in size)
         self._gl: Any = None
         self._model: mujoco.MjModel | None = None
@@ -54,7 +57,7 @@ class _Renderer:
         self._draws_shadows = hidden == OWN_VIEW
 
     def _open(self, model: mujoco.MjModel) -> None:
-        """Create the rendering context of a model, whose offscreen buffer is resized."""
+        """Create the rendering context of a model, and resize the model's offscreen buffer."""
         if self._gl is None:
             if _drawing - {os.getpid()}:
                 raise RenderError(
@@ -79,14 +82,14 @@ class _Renderer:
         self._model = model
 
     def _render(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
-        """Return the image of a state, (height, width, 3); it is overwritten."""
+        """Return the image of a state, (height, width, 3), which the next call overwrites."""
         if model is not self._model:
             self._open(model)
         self._gl.make_current()
         shown = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(model, data, self._option, None, self._camera, shown, self._scene)
-        # Draw the ground before the shadows on it: MuJoCo draws translucent geoms from far to near,
-        # and takes a large one for near.
+        # Draw the ground before the shadows on it. MuJoCo draws translucent geoms from far to near
+        # and counts a large one as near.
         for geom in self._scene.geoms[: self._scene.ngeom] if self._draws_shadows else ():
             if geom.rgba[3] < 1.0 and geom.modelrbound > 1.0:
                 geom.modelrbound = -_BEHIND_ALL_M
@@ -106,7 +109,7 @@ class _Renderer:
 
 
 class OnboardCamera(_Renderer):
-    """Renders the view of a camera in a model, without geoms that are for outside views only.
+    """Renders the view of a model's camera, without the geoms of outside views.
 
     Args:
         size: Width and height in pixels.
@@ -130,7 +133,7 @@ class OutsideCamera(_Renderer):
     def __init__(self, size: tuple[int, int]) -> None:
         if max(size) > _LARGEST and min(size) > 0:
             raise RenderError(
-                f"A view from outside has at most {_LARGEST} pixels a side, got "
+                f"A view from outside must have at most {_LARGEST} pixels a side, got "
                 f"{size[0]} x {size[1]}."
             )
         super().__init__(size, OWN_VIEW, _SUPERSAMPLED)
@@ -150,9 +153,9 @@ class OutsideCamera(_Renderer):
 
         Args:
             model: Compiled model.
-            data: Its state.
+            data: State of the model.
             middle: Point in the middle of the image, m, (3,).
-            distance_m: Distance from it.
+            distance_m: Distance of the camera from `middle`.
             azimuth_rad: Direction of view seen from above, from the x axis, counter-clockwise.
             elevation_rad: Angle of view above the horizon; negative looks down.
         """
@@ -170,25 +173,28 @@ Picture = NDArray[np.uint8]
 Corruption = Callable[[Picture, int], Picture]
 """Function from an image and a seed, >= 0 and constant within an episode, to an image."""
 
-# Share of the brightness that is left at night in red, green and blue, with the camera's highest
-# gain, and a gamma that darkens shadows. Without gain, a person saw nothing at a quarter of it.
+# Factors on red, green and blue at night with the camera's highest gain, and a gamma that darkens
+# shadows. At a quarter of these factors, which imitates no gain, a person saw nothing.
 _NIGHT_SHARE: Final = (0.46, 0.5, 0.66)
 _NIGHT_GAMMA: Final = 1.1
-_NIGHT_NOISE: Final = 9.0  # Standard deviation of a small sensor at that gain, of 255 levels.
-# Levels that glare adds, of 255, in its middle, and everywhere as a veil.
+_NIGHT_NOISE: Final = (
+    9.0  # Standard deviation of a small sensor's noise at the highest gain, of 255.
+)
+# Levels, of 255, that glare adds in its middle, and that it adds everywhere as a veil.
 _GLARE_PEAK, _GLARE_VEIL = 230.0, 28.0
-_BLUR: Final = 0.0125  # Standard deviation over the width: 2 pixels of 160.
-# Number of spots on a dirty lens, their radius over the width, and the share of light they absorb.
+_BLUR: Final = 0.0125  # Standard deviation, as a share of the width: 2 of 160 pixels.
+# Ranges of the number of spots on a dirty lens, the radius of a spot as a share of the image's
+# width, and the share of the light that it absorbs.
 _SPOTS, _SPOT_RADIUS, _SPOT_DEPTH = (8, 14), (0.02, 0.085), (0.45, 0.85)
 _DIRT: Final = np.array([52.0, 46.0, 34.0], np.float32)
-# Noise is cut from one long strip, because drawing it for each image would dominate the time. It
-# has this length, or twice the image's.
+# Noise is cut from one long strip, because drawing noise for each image would take most of the
+# time. The strip has at least this many values, and at least twice as many as an image.
 _STRIP: Final = 1 << 19
 _KEPT: Final = 64
 
 
 def night(picture: Picture, seed: int) -> Picture:
-    """Halve the brightness of an image, bluish, with a raised gain's noise of 9 levels."""
+    """Halve the brightness of an image, tint it blue, and add noise of 9 levels."""
     dark = np.empty(picture.shape, np.float32)
     for channel, table in enumerate(_night_tables()):
         dark[..., channel] = table[picture[..., channel]]
@@ -216,7 +222,7 @@ def blur(picture: Picture, seed: int) -> Picture:
 
 
 def dirt(picture: Picture, seed: int) -> Picture:
-    """Add 8 to 14 spots of mud, at places of the seed, that absorb 45 to 85 % of the light."""
+    """Add 8 to 14 spots of mud that absorb 45 to 85 % of the light; the seed places them."""
     keeps, mud = _dirt(seed, *picture.shape[:2])
     return _bytes(picture * keeps + mud)
 
@@ -235,7 +241,7 @@ def find_corruption(name: str) -> Corruption:
 
 
 def _bytes(levels: NDArray[np.floating[Any]]) -> Picture:
-    """Levels rounded and clipped to 0 to 255; `levels` is overwritten."""
+    """Round levels and clip them to 0 to 255; `levels` is overwritten."""
     levels += 0.5
     return np.clip(levels, 0.0, 255.0, out=levels).astype(np.uint8)
 
@@ -252,7 +258,7 @@ def _strip(length: int) -> NDArray[np.float32]:
 
 
 def _noise(picture: Picture, seed: int) -> NDArray[np.float32]:
-    """Standard normal noise of the image's shape, a function of the seed and the image."""
+    """Standard normal noise of an image's shape, determined by the seed and the image."""
     # Different images nearly always have different sums.
     mixed = (int(picture.sum(dtype=np.int64)) * 2_654_435_761 + seed * 40_503) & 0xFFFF_FFFF
     strip = _strip(max(_STRIP, 2 * picture.size))
@@ -262,7 +268,7 @@ def _noise(picture: Picture, seed: int) -> NDArray[np.float32]:
 
 @functools.lru_cache(_KEPT)
 def _glare(seed: int, height: int, width: int) -> NDArray[np.float32]:
-    """Levels that the glare of a seed adds, (H, W, 3)."""
+    """Levels that glare adds, (H, W, 3)."""
     rng = np.random.default_rng([seed, 1])
     x, y = rng.uniform(0.15, 0.85) * width, rng.uniform(0.05, 0.4) * height
     rows, columns = np.mgrid[:height, :width].astype(np.float32)
@@ -277,7 +283,7 @@ def _glare(seed: int, height: int, width: int) -> NDArray[np.float32]:
 
 @functools.lru_cache(_KEPT)
 def _dirt(seed: int, height: int, width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Transmittance of a seed's dirt, (H, W, 1), and the light it adds, (H, W, 3)."""
+    """Transmittance of dirt, (H, W, 1), and the light that dirt adds, (H, W, 3)."""
     rng = np.random.default_rng([seed, 2])
     rows, columns = np.mgrid[:height, :width].astype(np.float32)
     keeps = np.ones((height, width), np.float32)
