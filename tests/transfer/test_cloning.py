@@ -176,7 +176,7 @@ def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
 def test_settings_that_contradict_themselves_are_refused() -> None:
     """Budgets must grow, and episodes have at least one step."""
     for budgets in ((), (0, 5), (5, 5), (10, 5)):
-        with pytest.raises(StudyError, match="Budgets are numbers of steps that grow"):
+        with pytest.raises(StudyError, match="Budgets must be increasing"):
             msgspec.structs.replace(TINY_CLONING, budgets=budgets)
     for name in ("eval_episodes", "eval_steps", "episode_steps"):
         with pytest.raises(StudyError, match="at least one episode, of at least one step"):

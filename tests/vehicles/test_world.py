@@ -139,10 +139,10 @@ def test_unsuitable_worlds_and_unknown_names_are_refused(
 def test_a_failed_layout_changes_nothing() -> None:
     world = _world()
     model, course, look = world.model, world.course, world.look
-    with pytest.raises(WorldError, match="Seeds of courses count from 0"):
+    with pytest.raises(WorldError, match="seed of a course must be at least 0"):
         world.lay_out(-1)
     dim = replace(look, light=0.3)
-    with pytest.raises(WorldError, match="off its vehicle or in the floor"):
+    with pytest.raises(WorldError, match="must be above the floor and on its vehicle"):
         world.lay_out(4, dim, CameraJitter(up_m=-1.0))
     assert (world.model, world.course, world.look) == (model, course, look)
     _drive(world, _AHEAD["car"], 0.2)

@@ -1,8 +1,8 @@
-"""Camera policies that are cloned from demonstrations, of an expert or of a teacher.
+"""Camera policies that are cloned from an expert or from a teacher.
 
 `CloneLearner` records an env's demonstrator, and evaluates a clone at each budget. `train_student`
-learns from a teacher with privileged observations: distances, speed and rate of turn, from which
-reinforcement learning takes two minutes. First the teacher drives, and the student clones it from
+learns from a teacher, a policy that observes distances, speed and rate of turn, and is trained by
+reinforcement learning in two minutes. First the teacher drives, and the student clones it from
 images alone (D. Chen et al., "Learning by Cheating", CoRL 2019). Then the student drives, and its
 images are labelled with the teacher's actions (S. Ross et al., "A Reduction of Imitation Learning
 and Structured Prediction to No-Regret Online Learning", AISTATS 2011).
@@ -48,9 +48,9 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
 
     Attributes:
         budgets: Numbers of demonstrated steps; a policy is trained on each, from the same start.
-        episode_steps: Steps of a demonstration; the next begins on another course.
+        episode_steps: Steps of a demonstration; each is on another course.
         eval_episodes: Episodes of an evaluation.
-        eval_steps: Steps of each of them.
+        eval_steps: Steps of an evaluation episode.
         clone: Settings of each training.
     """
 
@@ -67,9 +67,9 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
 
     def __post_init__(self) -> None:
         if min(self.eval_episodes, self.episode_steps, self.eval_steps) < 1:
-            raise StudyError("A learner needs at least one episode, of at least one step.")
+            raise StudyError("Each number of episodes and steps must be at least 1.")
         if not self.budgets or any(a >= b for a, b in pairwise((0, *self.budgets))):
-            raise StudyError(f"Budgets are numbers of steps that grow, got {self.budgets}.")
+            raise StudyError(f"Budgets must be increasing numbers above 0, got {self.budgets}.")
 
     @property
     def steps(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -78,11 +78,11 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
 
     @property
     def eval_every(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """The first budget; later ones are farther apart."""
+        """The first budget, in demonstrated steps."""
         return self.budgets[0]
 
     def whole_updates(self, steps: int) -> int:
-        """Round `steps` up to a budget; the largest if all are smaller."""
+        """Return the smallest budget of at least `steps`, or the largest if all are smaller."""
         return next((budget for budget in self.budgets if budget >= steps), self.budgets[-1])
 
     @property
@@ -91,11 +91,11 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
         return self.eval_steps
 
     def for_budget(self, steps: int) -> CloningSettings:
-        """Return the settings for a shorter budget: the same."""
+        """Return these settings, which are the same for a shorter budget."""
         return self
 
     def rhythm(self) -> str:
-        """Return when policies are evaluated, and what they learn from."""
+        """Describe when policies are evaluated and which steps they learn from."""
         budgets = ", ".join(f"{budget:,}" for budget in self.budgets)
         return (
             f"after {budgets} steps. Steps are demonstrated steps: at each budget a policy is "
@@ -112,10 +112,10 @@ def _drive(
     chosen: Callable[[NDArray[np.uint8], NDArray[np.float32]], NDArray[np.float32]],
     on_steps: Callable[[int], None] = lambda steps: None,
 ) -> Dataset:
-    """Drive, and record frames as a policy sees them, with what a demonstrator intended at each.
+    """Drive, and record the prepared image and the demonstrator's intended action of each step.
 
-    `chosen` returns the action to take, for a frame and the demonstrator's disturbed action, and
-    `on_steps` is called with the number of steps driven, after each episode.
+    `chosen` returns the action to take, for an image and the demonstrator's disturbed action. After
+    each episode, `on_steps` is called with the number of steps driven.
     """
     pictures: list[NDArray[np.uint8]] = []
     actions = np.empty((steps, 2), np.float32)
@@ -146,7 +146,7 @@ def _dataset(
 def record_demonstrations(
     env: EnvRef, steps: int, episode_steps: int, seed: int, framing: Framing
 ) -> Dataset:
-    """Record the demonstrator of an env, which takes its disturbed actions."""
+    """Record the demonstrator of an env; the env executes its disturbed actions."""
     with closing(env.make(max_episode_steps=episode_steps)) as made:
         inner: Any = made.unwrapped
         if not hasattr(inner, "demonstrator"):
@@ -158,7 +158,7 @@ def record_demonstrations(
 def load_or_record(
     file: SharedFile, env: EnvRef, steps: int, episode_steps: int, framing: Framing
 ) -> Dataset:
-    """Load demonstrations from a file that has enough of them, or record and write it."""
+    """Load demonstrations from a file if it has enough steps, or record and write them."""
     path, names = file.path, ("pictures", "actions", "episodes")
     if path.exists():
         with np.load(path) as arrays, closing(env.make()) as made:
@@ -186,14 +186,14 @@ class CloneLearner(Learner[CloningSettings]):
     """
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
-        """Refuse an env without a camera or a demonstrator."""
+        """Raise a `StudyError` if the env has no camera or no demonstrator."""
         space = traits.observation_space
         is_image = isinstance(space, gym.spaces.Box) and len(space.shape) == 3
         is_camera = is_image and cast("Any", space).dtype == np.uint8
         if not is_camera or not traits.has_demonstrator:
             raise StudyError(
                 f"{env} has no {'demonstrator' if is_camera else 'camera'}, and {self.name} learns "
-                "from the images of a demonstrator: give a --learner that begins with ppo."
+                "from a demonstrator's images: give a --learner whose name begins with ppo."
             )
 
     def train(  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -212,9 +212,9 @@ class CloneLearner(Learner[CloningSettings]):
     ) -> CameraPolicy:
         """Clone the demonstrator at each budget, from the same start, and evaluate each clone.
 
-        Besides the arguments of every learner, `demonstrations` is the file of the demonstrations,
-        `only_last` says that only the last budget is needed, and `rehearsed` names an env, steps
-        and a file of demonstrations to mix in. The clone of the last budget is returned.
+        `demonstrations` is the file of the demonstrations. `only_last` skips all budgets but the
+        last. `rehearsed` is an env, a number of steps and a file of demonstrations to mix in. The
+        clone of the last budget is returned.
         """
         del body_map
         settings, own_seed = self.settings.clone, seed % 2**31
@@ -252,7 +252,7 @@ class CloneLearner(Learner[CloningSettings]):
         """Load a clone."""
         policy = load_clone(path)
         if not isinstance(policy, CameraPolicy):
-            raise PolicyError(f"{path} has been exported: give the clone that it was made from.")
+            raise PolicyError(f"{path} is an exported policy: give the clone it was exported from.")
         return policy
 
     def origin(self, path: Path) -> PolicyCard:
@@ -261,9 +261,9 @@ class CloneLearner(Learner[CloningSettings]):
         found, wanted = policy.net.framing, self.settings.clone.framing
         if found != wanted:
             raise PolicyError(
-                f"{path} takes images of {found.height} x {found.width} pixels from {found.top:g} "
-                f"of their height on, and {self.name} {wanted.height} x {wanted.width} from "
-                f"{wanted.top:g}: give a clone that takes the same images."
+                f"{path} uses images of {found.height} x {found.width} pixels without the top "
+                f"{found.top:g} of their height, and {self.name} {wanted.height} x {wanted.width} "
+                f"without the top {wanted.top:g}: give a clone that uses the same images."
             )
         if policy.card.env is None:
             raise PolicyError(
@@ -274,7 +274,7 @@ class CloneLearner(Learner[CloningSettings]):
 
 
 def stated(policy: CameraPolicy, env: EnvRef, steps: int, seed: int, **data: Any) -> CameraPolicy:
-    """State in a clone's card the env, and the steps and seed of all of its training."""
+    """Return a clone whose card states its env and the steps and seed of its training."""
     identity = known({ENV: identify(env)})
     data = {**policy.card.data, **data}
     return policy.carded(env=env, steps=steps, seed=seed, identity=dict(identity), data=data)
@@ -284,13 +284,13 @@ STUDENT_STEPS: Final = 7200
 """Default steps of a student: six minutes, a third of which the teacher drives."""
 
 STUDENT_CLONING: Final = CloneSettings(held_out=0.0, passes=50.0, most_steps=3000)
-"""Default settings of its cloning."""
+"""Default settings with which a student clones its teacher."""
 
 _EPISODE_STEPS: Final = 200
-# Rounds that the student drives, trained again before each, after one round of the teacher. With
-# one round of as many steps students had 1.8 collisions per 100 m.
+# Rounds that the student drives after one round of the teacher. The student is trained again before
+# each round. With a single longer round, students had 1.8 collisions per 100 m.
 _ROUNDS: Final = 2
-# Limit of the training steps of the clones that drive a round.
+# Largest number of training steps of a clone that only drives a round.
 _BETWEEN: Final = 1500
 
 
@@ -307,22 +307,22 @@ def train_student(
 
     Args:
         env: The student's env, such as `Car`.
-        teacher: A policy of the same vehicle on distances, such as one of `CarRanges`.
+        teacher: A policy of the same vehicle that observes distances, such as one for `CarRanges`.
         steps: Steps of driving: a third by the teacher, the others by the student.
         seed: Seed of everything random.
-        settings: Settings of its cloning.
+        settings: Settings with which the student clones the teacher.
         on_steps: Called with the number of steps driven, after each episode.
 
     Raises:
-        StudyError: If the env has no teachers, the policy is of another env, or there is not at
-            least one step for each round.
+        StudyError: If the env has no teachers, the policy is of another env, or there are fewer
+            steps than rounds.
     """
     if steps < 1 + _ROUNDS:
         raise StudyError(f"A student needs at least {1 + _ROUNDS} steps, got {steps}.")
     with closing(env.make(max_episode_steps=_EPISODE_STEPS)) as made:
         inner: Any = made.unwrapped
         if not hasattr(inner, "taught_by"):
-            raise StudyError(f"{env} has no teachers: choose a vehicle's camera, such as Car.")
+            raise StudyError(f"{env} has no teachers: choose a vehicle's camera env, such as Car.")
         learned_in = teacher.card.trained_in
         wanted, taught = inner.teacher_env, learned_in.id
         if taught != wanted:
@@ -354,10 +354,11 @@ def train_student(
 
 
 def _moving(action: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return steering and throttle, (..., 2), with at least the least throttle.
+    """Return steering and throttle, (..., 2), with the throttle raised to `LEAST_THROTTLE`.
 
-    Images do not show the speed. If the teacher brakes or starts depending on it, a clone takes
-    the mean of both actions; one stood still on one course of 17. So it never drives with less.
+    Images do not show the speed. If the teacher brakes or starts depending on the speed, a clone
+    learns the mean of both actions; without a least throttle, one clone stood still on 1 of 17
+    courses.
     """
     return np.maximum(action, np.array((-np.inf, LEAST_THROTTLE), np.float32))
 
@@ -365,10 +366,10 @@ def _moving(action: NDArray[np.float32]) -> NDArray[np.float32]:
 def _student(
     shown: Sequence[Dataset], settings: CloneSettings, seed: int, most_steps: int
 ) -> CameraPolicy:
-    """Clone a teacher from all that was recorded, in at most this many training steps."""
+    """Clone a teacher from the recorded data in at most `most_steps` training steps."""
     data = merged([replace(part, states=None, state_layout=None) for part in shown])
     actions = _moving(data.actions)
-    # The whole range of the throttle above the least is the range of the network's output.
+    # Scale the throttle so that its range above the least is the range of the network's output.
     actions[:, 1] = 2.0 * ((actions[:, 1] - LEAST_THROTTLE) / (1.0 - LEAST_THROTTLE)) - 1.0
     settings = msgspec.structs.replace(
         settings, most_steps=most_steps, fewest_steps=min(settings.fewest_steps, most_steps)

@@ -111,7 +111,7 @@ def test_an_operator_replaces_the_course(tmp_path: Path) -> None:
         other = operator.where()
         assert (other.x, other.y) != (first.x, first.y)
         # The board survives an invalid request.
-        with pytest.raises(RobotError, match="Seeds of courses count from 0"):
+        with pytest.raises(RobotError, match="seed of a course must be at least 0"):
             operator.lay_out(-1)
         operator.lay_out(4)
         again = operator.where()

@@ -215,7 +215,7 @@ class Floating(BoundVehicle):
         return self._log_m
 
     def _state(self) -> tuple[float, float, float, float, float, float]:
-        """Heading, rad, its cosine and sine, velocity in the world, m/s, and rate of turn, rad/s."""
+        """Heading, rad, its cosine and sine, velocity over ground, m/s, and rate of turn, rad/s."""
         heading = float(self._qpos[self._qpos0 + 2])
         vx, vy, r = self._qvel[self._qvel0 : self._qvel0 + 3].tolist()
         return heading, math.cos(heading), math.sin(heading), vx, vy, r

@@ -146,7 +146,7 @@ class DcMotor:
         return self.torque_per_current * self.volts_per_speed / self.resistance
 
     def geared(self, ratio: float, efficiency: float = 1.0) -> DcMotor:
-        """The motor with one more gear stage; `ratio` is turns of this shaft per turn of the next."""
+        """The motor with one more gear stage, in which `ratio` turns of the shaft make one turn."""
         return replace(
             self,
             volts_per_speed=self.volts_per_speed * ratio,

@@ -1,7 +1,7 @@
 """Images of any vehicle's camera as one virtual camera would have taken them.
 
-Each vehicle mounts its camera at another angle, and some see their own bonnet. The virtual camera
-looks level, with the same field of view for all, and sees no part of the vehicle.
+Vehicles mount their cameras at different angles, and some cameras see the vehicle's bonnet. The
+virtual camera looks level, has one field of view, and sees no part of the vehicle.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _MOST_MISSING: Final = 0.15  # Largest share of the view's pixels that a camera 
 
 # Vertical fields of view at which the search for the camera's field of view starts, degrees.
 _FIRST_FOVY_DEG: Final = (30.0, 48.0, 70.0, 100.0)
-# Standard deviations beyond which an image of a board does not tell the camera's geometry.
+# Largest accepted standard deviations of a camera's pitch and field of view, degrees.
 _PITCH_SD_DEG, _FOVY_SD_DEG = 1.0, 2.5
 _MOST_TILT_DEG: Final = 45.0
 _CORNER_SD_PX: Final = 0.1
@@ -43,14 +43,14 @@ _YELLOW: Final = (255, 220, 0)
 
 @dataclass(frozen=True, slots=True)
 class CameraGeometry:
-    """How a camera looks at the world.
+    """Pitch and field of view of a camera.
 
     Attributes:
-        pitch_deg: Angle of the optical axis below the horizon, degrees.
+        pitch_deg: Angle of the optical axis below the horizon, degrees, above -90 and below 90.
         fovy_deg: Vertical field of view, degrees, above 0 and below 180.
 
     Raises:
-        WorldError: If there is no such camera.
+        WorldError: If an angle is out of its range.
     """
 
     pitch_deg: float
@@ -59,20 +59,20 @@ class CameraGeometry:
     def __post_init__(self) -> None:
         if not (abs(self.pitch_deg) < 90.0 and 0.0 < self.fovy_deg < 180.0):
             raise WorldError(
-                "A camera's pitch is from -90 to 90 degrees and its field of view from 0 to 180, "
-                f"got {self.pitch_deg:g} and {self.fovy_deg:g}."
+                "A camera's pitch must be above -90 and below 90 degrees and its field of view "
+                f"above 0 and below 180, got {self.pitch_deg:g} and {self.fovy_deg:g}."
             )
 
 
 class Rectifier:
     """Warps images of one camera to the virtual camera.
 
-    A pixel of the virtual camera is a ray; the ray, turned by the pitch, meets a pixel of the real
-    camera. A camera that is mounted higher still sees the ground farther down.
+    Each pixel of the virtual camera is a ray, which is turned by the pitch to find the pixel of the
+    real camera. Differences in the height of cameras are not corrected.
 
     Args:
         geometry: The real camera.
-        size: Width and height of its images, pixels.
+        size: Width and height of the real camera's images, pixels.
 
     Raises:
         WorldError: If the camera does not cover the view of the virtual camera.
@@ -81,7 +81,7 @@ class Rectifier:
     def __init__(self, geometry: CameraGeometry, size: tuple[int, int]) -> None:
         wide, high = size
         columns, rows = CANONICAL_SIZE
-        # Samples within each pixel; the mean of them is the pixel.
+        # A pixel is the mean of the samples within it.
         part = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
         u = (np.arange(columns)[:, None] + part).ravel()
         v = (np.arange(rows)[:, None] + part).ravel()
@@ -90,10 +90,10 @@ class Rectifier:
         if missing > _MOST_MISSING:
             raise WorldError(
                 f"A camera that looks {geometry.pitch_deg:g} degrees down with a vertical field "
-                f"of view of {geometry.fovy_deg:g} degrees misses {100 * missing:.0f} % of what "
-                "policies for all vehicles look at, 18 degrees above the horizon to 21 below and "
-                f"31 to each side, in frames of {wide} x {high} pixels: turn it level, or take "
-                "wider frames, of its whole sensor, or a wider lens."
+                f"of view of {geometry.fovy_deg:g} degrees misses {100 * missing:.0f} % of the "
+                "view that all vehicles share, 18 degrees above the horizon to 21 below and 31 to "
+                f"each side, in frames of {wide} x {high} pixels: turn the camera level, or use "
+                "wider frames from its whole sensor, or a wider lens."
             )
         places = np.clip(row, 0, high - 1) * wide + np.clip(column, 0, wide - 1)
         shape = (rows, _SAMPLES, columns, _SAMPLES)
@@ -103,11 +103,12 @@ class Rectifier:
     def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return an image, (height, width, 3), as the virtual camera would have taken it.
 
-        It has the shape (48, 80, 3). What the camera does not see repeats the nearest pixel.
+        The result has the shape (48, 80, 3). Pixels outside the real camera's view repeat the
+        nearest pixel inside it.
         """
         if picture.shape != self._shape:
             raise WorldError(
-                f"The images of this camera have the shape {self._shape}, got {picture.shape}."
+                f"The images of this camera must have the shape {self._shape}, got {picture.shape}."
             )
         pixels = picture.reshape(-1, 3)
         total = np.zeros((self._places.shape[1], 3), np.uint16)
@@ -121,10 +122,10 @@ class CanonicalView:
     """Warps images to the virtual camera of all vehicles.
 
     Args:
-        camera: The camera; None for the one that each episode states.
+        camera: The camera that took the images; None for the camera that each episode states.
 
     Attributes:
-        rectifiers: Those used so far, by camera and size of its images.
+        rectifiers: Rectifiers used so far, keyed by the camera and the size of its images.
     """
 
     def __init__(self, camera: CameraGeometry | None = None) -> None:
@@ -133,17 +134,19 @@ class CanonicalView:
         self._bodies: set[str] = set()
 
     def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
-        """Return an image of an episode, unless its actions are waypoints, as that camera's.
+        """Return an image of an episode as the virtual camera would have taken it.
+
+        Images of episodes whose actions are waypoints are returned unchanged.
 
         Raises:
             DemosError: If the camera is unknown, or the episodes are of several bodies.
-            WorldError: If there is no such camera, or it does not cover the virtual camera's view.
+            WorldError: If the camera is invalid or does not cover the virtual camera's view.
         """
         self._bodies.add(header.body)
         if len(self._bodies) > 1:
             raise DemosError(
                 f"These demonstrations are of several bodies, {', '.join(sorted(self._bodies))}, "
-                "which turn differently: learn from one at a time."
+                "which turn differently: give demonstrations of one body at a time."
             )
         if header.action_layout.names[0].startswith("waypoint/"):
             return picture
@@ -167,7 +170,7 @@ class CanonicalView:
             f"looks {pitch:.3g} degrees down with a vertical field of view of {fovy:.3g}"
             for pitch, fovy in cameras
         )
-        return f"Images are warped to the camera of all vehicles; the one that took them {each}."
+        return f"Images are warped to the view that all vehicles share; their camera {each}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +181,7 @@ class MeasuredCamera:
         geometry: The geometry.
         roll_deg: Turn of the camera about its optical axis, degrees, clockwise as it looks.
         pitch_sd_deg: Standard deviation of the pitch, degrees.
-        fovy_sd_deg: Standard deviation of the field of view, degrees; 0 where it was given.
+        fovy_sd_deg: Standard deviation of the field of view, degrees; 0 if the field was given.
         error_px: Root mean square distance of the corners from where they should be, pixels.
     """
 
@@ -216,7 +219,7 @@ def measure_camera(
             the board must be turned by some 30 to 45 degrees: seen straight on, a near board in a
             wide field of view looks like a far board in a narrow one.
         corners: Inner corners of the board along its two sides, each at least 3.
-        fovy_deg: Vertical field of view where it is known, degrees.
+        fovy_deg: Vertical field of view, degrees; None to measure it.
 
     Raises:
         MissingExtra: If OpenCV is not installed.
@@ -255,8 +258,7 @@ def measure_camera(
             cv2.calibrateCameraExtended([board], [points], size, lens, np.zeros(5), flags=flags)
         )
     error, lens, _, turns, _, lens_sd, pose_sd, _ = min(fits, key=lambda fit: fit[0])
-    # Corners are detected to a tenth of a pixel at best in each direction, even if a model fits
-    # well.
+    # Corners are detected to 0.1 pixels at best in each direction, even if the fit is better.
     scale = max(1.0, math.sqrt(2.0) * _CORNER_SD_PX / error)
     focal = float(lens[1, 1])
     fovy = math.degrees(2.0 * math.atan(0.5 * height / focal))
@@ -273,7 +275,7 @@ def measure_camera(
     )
     if abs(pitch) > _MOST_TILT_DEG:
         raise WorldError(
-            f"The board must stand upright, and is tilted by {abs(pitch):.0f} degrees."
+            f"The board must stand upright, but is tilted by {abs(pitch):.0f} degrees."
         )
     if pitch_sd > _PITCH_SD_DEG or fovy_sd > _FOVY_SD_DEG:
         raise WorldError(
@@ -286,11 +288,11 @@ def measure_camera(
 
 
 def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
-    """Draw the horizon and the edge of what the virtual camera sees, in yellow, on a new image.
+    """Draw the horizon and the edge of the virtual camera's view, in yellow, on a copy of an image.
 
     Args:
-        picture: Shape (height, width, 3).
-        geometry: The camera that took it.
+        picture: Image, shape (height, width, 3).
+        geometry: The camera that took the image.
     """
     height, width = picture.shape[:2]
     Rectifier(geometry, (width, height))
@@ -298,7 +300,7 @@ def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[n
     along, none = np.linspace(0.0, 1.0, 2 * (width + height)), np.zeros(2 * (width + height))
     edges = ((along, none), (along, none + 1.0), (none, along), (none + 1.0, along))
     lines = [(columns * x, rows * y) for x, y in edges]
-    # A dotted line for the horizon.
+    # The horizon is a dotted line.
     lines.append((columns * along[::8], none[::8] + _HORIZON))
     drawn = picture.copy()
     for x, y in lines:
@@ -313,7 +315,7 @@ def _seen_at(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return columns and rows of a camera's pixels at x and y in the virtual image, pixels.
 
-    What is behind the camera is at (-1, -1). `size` is the width and height of its images.
+    Points behind the camera are at (-1, -1). `size` is the width and height of its images.
     """
     wide, high = size
     focal = 0.5 * high / math.tan(0.5 * math.radians(geometry.fovy_deg))

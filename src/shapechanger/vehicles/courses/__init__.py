@@ -1,4 +1,4 @@
-"""Courses: laid out from a seed here, as values of `course`, and drawn by `scene`."""
+"""Courses: `lay_out` makes a `Course` from a seed, and `scene` draws it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ATTEMPTS: Final = 500
 
 
 def lay_out(world: str, seed: int) -> Course:
-    """Lay out the course of a seed, which is the same on every machine.
+    """Lay out the course of a seed; a seed gives the same course on every machine.
 
     Args:
         world: One of `WORLDS`.
@@ -34,7 +34,7 @@ def lay_out(world: str, seed: int) -> Course:
     if world not in WORLDS:
         raise UnknownName("world", world, WORLDS)
     if seed < 0:
-        raise WorldError(f"Seeds of courses count from 0, got {seed}.")
+        raise WorldError(f"The seed of a course must be at least 0, got {seed}.")
     rng = np.random.default_rng([zlib.crc32(world.encode()), seed])
     for _ in range(_ATTEMPTS):
         is_open = world != "corridor"
@@ -63,7 +63,7 @@ def start_pose(course: Course, seed: int) -> Pose:
     behind, before = (round(reach / course.spacing) for reach in (_BEHIND_M, _AHEAD_M))
     bend = _sums(turn_angles(route), behind, 0)
     places = np.flatnonzero((_sums(~free, behind, before) < 0.5) & (np.abs(bend) < _STRAIGHT_RAD))
-    # Without any such place, the first point of the route: obstacles keep away from it.
+    # If there is no free point, take the first point of the route, which obstacles keep away from.
     i = int(places[int(np.random.default_rng(seed).integers(len(places)))]) if len(places) else 0
     dx, dy = ahead[i] - route[i - 1]
     return Pose(float(route[i, 0]), float(route[i, 1]), float(np.arctan2(dy, dx)))

@@ -1,4 +1,4 @@
-"""Winding lanes in the open, yards and harbours: a smooth route between walls of short pieces."""
+"""Yards and harbours: winding lanes along a smooth route, between walls of short pieces."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ from shapechanger.vehicles.courses.geometry import (
     wall_segments,
 )
 
-# Points of the route while it is shaped, and for pairwise distances.
+# Number of points of the route while it is shaped, and while its pairwise distances are computed.
 _FINE, _COARSE = 1024, 128
 _SPACING_M: Final = 0.1
-_WIND_RAD: Final = 0.4  # Smallest sum of the turns to either side.
+_WIND_RAD: Final = 0.4  # Smallest sum of the left turns, and of the right turns, of a route.
 
 
 @dataclass(frozen=True, slots=True)
 class BankKind:
-    """A kind of bank; `open_worlds.toml` describes its numbers."""
+    """A kind of bank; `open_worlds.toml` describes the fields."""
 
     surface: Surface
     share: float
@@ -54,7 +54,7 @@ class BankKind:
 
 @dataclass(frozen=True, slots=True)
 class OpenWorld:
-    """A kind of course in the open; `open_worlds.toml` describes its numbers."""
+    """A kind of course in the open; `open_worlds.toml` describes the fields."""
 
     pitch: tuple[float, float]
     cells: tuple[int, int]
@@ -74,8 +74,8 @@ class OpenWorld:
 def _dig_channel(rng: np.random.Generator, world: OpenWorld) -> tuple[Array, Array] | None:
     """Try to lay out a route: points, m, (n, 2), and distance from the banks, m, (n,).
 
-    The corners of a loop on a grid are smoothed more and more until the lane fits everywhere. None
-    if the random loop is too tight or too close to itself.
+    The corners of a loop on a grid are smoothed more and more until the lane fits everywhere.
+    Returns None if the random loop is too tight or too close to itself.
     """
     points = random_loop(rng, int(rng.integers(world.cells[0], world.cells[1] + 1)), world.pitch)
     if points is None:
@@ -123,7 +123,7 @@ def _bank(rng: np.random.Generator, line: Array, kinds: tuple[BankKind, ...]) ->
     knots = arc_lengths(line)
     shares = [kind.share for kind in kinds]
     ends: list[float] = []
-    pieces: list[tuple[BankKind, float]] = []  # With their heights, m.
+    pieces: list[tuple[BankKind, float]] = []  # Kind and height, m, of each piece.
     s = 0.0
     while s < knots[-1]:
         kind = kinds[weighted_choice(rng, shares)]
@@ -134,7 +134,7 @@ def _bank(rng: np.random.Generator, line: Array, kinds: tuple[BankKind, ...]) ->
             count -= 1
             ends.append(s)
             pieces.append((kind, height))
-    # Scaled so that the last piece ends where the first begins.
+    # The pieces are scaled so that the last one ends where the first begins.
     at_s = np.array(ends) * (knots[-1] / s)
     points = interpolate(line, knots, at_s)
     back = -normals(line)[np.searchsorted(knots[:-1], at_s % knots[-1]) % len(line)]

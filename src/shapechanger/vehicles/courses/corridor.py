@@ -23,7 +23,7 @@ _DOOR_M: Final = 0.9 + 2 * 0.06  # Width of a door with its frame.
 _RECESS_M: Final = 0.15  # Depth of a recessed door.
 _PLAIN_M: Final = (0.4, 2.4)
 
-# Panels in the plaster: surface, share, and range of widths, m.
+# Panels in the plaster: surface, share of the panels, and range of widths, m.
 _PANELS: tuple[tuple[Surface, float, tuple[float, float]], ...] = (
     ("door", 0.5, (_DOOR_M, _DOOR_M)),
     ("window", 0.2, (1.0, 2.0)),
@@ -38,11 +38,11 @@ def panel_walls(
 ) -> tuple[Wall, ...]:
     """Walls along a closed line of corners, m, (n, 2), with the lane on their left.
 
-    Legs are at least 1.5 m long and at right angles; `bends` is 1 for corners that stand out into
-    the lane, and -1 for nooks, (n,).
+    Legs, the lines between corners, are at least 1.5 m long and at right angles. `bends`, (n,), is
+    1 for corners that project into the lane, and -1 for nooks.
     """
     n = len(corners)
-    # Length by which corners are cut off, mostly 0.
+    # Length by which each corner is cut off, m; mostly 0.
     cut = np.where(rng.random(n) < 0.3, rng.uniform(0.2, 0.5, n), 0.0)
     brick = np.where((bends > 0) & (rng.random(n) < 0.35), rng.uniform(0.3, 0.8, n), 0.0)
     ahead, _ = _legs(corners)
@@ -64,7 +64,7 @@ def panel_walls(
 
 
 def _leg(rng: np.random.Generator, start: Array, end: Array, height: float) -> Iterator[Wall]:
-    """Plaster between two points, with panels in it."""
+    """Walls of plaster with panels between two points."""
     length = float(np.hypot(*(end - start)))
     ahead = (end - start) / length
     back = np.array([ahead[1], -ahead[0]]) * _RECESS_M  # Away from the lane.
@@ -94,7 +94,7 @@ _CEILING_M: Final = 2.5  # Height of the ceiling, and of every wall.
 _PITCH_M, _WIDTH_M, _LENGTH_M = (4.0, 6.0), (1.8, 2.4), (40.0, 90.0)
 _GAP_M, _SPACING_M = 0.9, 0.1
 
-# Furniture along the walls, with the depth as the width; common sizes.
+# Furniture of common sizes along the walls; the width is the depth from the wall.
 _FURNITURE = (
     Scatter("box", (0.3, 0.6), (0.25, 0.45), (0.2, 0.5), 0.2),
     Scatter("bin", (0.25, 0.35), (0.25, 0.35), (0.5, 0.7), 0.2),
@@ -166,8 +166,8 @@ def _legs(corners: Array) -> tuple[Array, Array]:
 def _route(corners: Array, widths: Array) -> tuple[Array, Array]:
     """Route with rounded corners, m, (m, 2), and the distance of each corner along it, m, (n,).
 
-    It starts after a third of the first leg. With half the width as the radius of a corner, its
-    distance from the inner edge is constant.
+    The route starts after a third of the first leg. The radius of a corner is half the width of the
+    lane, so the distance from the inner edge is constant.
     """
     ahead, _ = _legs(corners)
     back = np.roll(ahead, 1, axis=0)
@@ -219,7 +219,7 @@ def _plant(
         if rng.random() < 0.25:
             size = _FURNITURE[3] if rng.random() < 0.7 else _FURNITURE[1]
             obstacle = size.draw(rng, 0.0)
-            # Free of both walls.
+            # The plant stands 2 cm from both walls.
             x, y = corner - way + np.sign(way) * (obstacle.length / 2.0 + 0.02)
             obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(s))
 

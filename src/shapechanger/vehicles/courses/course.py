@@ -1,4 +1,4 @@
-"""Courses and their looks as plain values, without simulator, and the vehicles' home worlds."""
+"""Courses, their light and colours, and each vehicle's home world, as data without a simulator."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HOME: Final[Mapping[str, str]] = MappingProxyType(
 """Default world of each vehicle."""
 
 FLOODED: Final = "flooded-corridor"
-"""The corridor with water for a floor, on which a boat drives the courses of land vehicles."""
+"""World with the courses of corridors, flooded so that a boat can drive on them."""
 
 WATER: Final = frozenset({"harbour", FLOODED})
 """Worlds for vehicles that float."""
@@ -46,8 +46,8 @@ class Wall:
     Seen from `start` towards `end`, the lane is on the left; only that side is ever visible.
 
     Attributes:
-        start: x and y of its start, m.
-        end: x and y of its end, m.
+        start: x and y of the start, m.
+        end: x and y of the end, m.
         height: Height above the ground, m.
         surface: Material.
     """
@@ -82,10 +82,10 @@ class Obstacle:
     """An upright box or cylinder in the lane.
 
     Attributes:
-        kind: Kind, which also decides whether it is a box or a cylinder.
-        x: Position of its middle, m.
-        y: Position of its middle, m.
-        yaw: Angle of its length from the x axis, rad, counter-clockwise.
+        kind: Kind, which also decides whether the obstacle is a box or a cylinder.
+        x: Position of the middle, m.
+        y: Position of the middle, m.
+        yaw: Angle of the length from the x axis, rad, counter-clockwise.
         length: Length, or diameter of a cylinder, m.
         width: Width, or diameter of a cylinder, m.
         height: Height above the ground, m.
@@ -101,7 +101,7 @@ class Obstacle:
 
     @property
     def is_round(self) -> bool:
-        """Return whether it is a cylinder."""
+        """Return whether the obstacle is a cylinder."""
         return self.kind in ("plant", "cone", "post", "tree", "buoy", "bin")
 
 
@@ -110,9 +110,9 @@ class Lamp:
     """A rectangular light under the ceiling, or a patch of sun on the ground.
 
     Attributes:
-        x: Position of its middle, m.
-        y: Position of its middle, m.
-        yaw: Angle of its length from the x axis, rad.
+        x: Position of the middle, m.
+        y: Position of the middle, m.
+        yaw: Angle of the length from the x axis, rad.
         length: Length, m.
         width: Width, m.
     """
@@ -160,7 +160,7 @@ class Course:
 
 
 def require_element(vehicle: str, *, floats: bool, world: str) -> None:
-    """Check that a world has water if, and only if, the vehicle floats."""
+    """Raise a `WorldError` unless a world has water exactly if the vehicle floats."""
     if floats != (world in WATER):
         reason = "floats" if floats else "does not float"
         raise WorldError(f"A {vehicle} {reason}: it cannot drive in a {world}.")
@@ -170,10 +170,10 @@ Colour = tuple[float, float, float]
 """Red, green and blue, each a share from 0 to 1."""
 
 VARIANTS: Final = 12
-"""Number of texture sets that looks are drawn from; few enough to cache them all."""
+"""Number of texture sets that random looks use, small enough to cache all sets."""
 
-# Red, green and blue at a `warmth` of 1. The mean colour of a car's camera in a lit corridor at
-# night was 76, 67, 14.
+# Red, green and blue of the light at a `warmth` of 1. For comparison, the mean colour of images of
+# a car's camera in a lit corridor at night was 76, 67, 14.
 _WARM: Final = np.array([1.0, 0.92, 0.2])
 
 
@@ -186,8 +186,8 @@ class Look:
         warmth: Colour of the light, from 0 (white) to 1 (the yellow-green of old lamps).
         contrast: From 0 (the same light everywhere) to 1 (dark between the lamps).
         gloss: Reflectance of the ground or the water, 0 to 0.9.
-        wall: Factors on the colours of the walls.
-        ground: Factors on the colours of the ground.
+        wall: Factors on red, green and blue of the walls.
+        ground: Factors on red, green and blue of the ground.
         texture_seed: Seed of the textures, >= 0.
     """
 
@@ -230,7 +230,7 @@ class Look:
         )
 
     def tone(self, colour: Colour = (1.0, 1.0, 1.0)) -> Colour:
-        """A colour in this light, each channel from 0 to 1."""
+        """Return a colour as it appears in this light, each channel from 0 to 1."""
         tinted = 1.0 - self.warmth * (1.0 - _WARM)
         red, green, blue = (float(x) for x in np.clip(self.light * tinted * colour, 0.0, 1.0))
         return red, green, blue

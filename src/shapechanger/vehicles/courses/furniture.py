@@ -24,7 +24,7 @@ from shapechanger.vehicles.courses.geometry import (
 def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
     """Draw an index with a probability proportional to its share, >= 0.
 
-    `Generator.choice` is thirty times slower, and this is called for every panel of a wall.
+    `Generator.choice` would be thirty times slower, and each panel of a wall needs a draw.
     """
     left = float(rng.random()) * sum(shares)
     for i, share in enumerate(shares):
@@ -34,14 +34,14 @@ def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
     return len(shares) - 1
 
 
-# Lengths of the route after and before its first point that stay free, m; a truck is 1 m long.
+# Lengths of the route without obstacles after and before its first point, m; a truck is 1 m long.
 _FREE_AHEAD_M, _FREE_BEHIND_M = 3.0, 2.0
 _BEFORE_DOORS_M: Final = 0.3  # Smallest distance from a door.
 
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """A kind of obstacle; `open_worlds.toml` describes its numbers."""
+    """A kind of obstacle; `open_worlds.toml` describes the fields."""
 
     kind: ObstacleKind
     length: tuple[float, float]
@@ -51,7 +51,7 @@ class Scatter:
     moored: float = 0.0
 
     def draw(self, rng: np.random.Generator, yaw: float) -> Obstacle:
-        """Draw an obstacle at the origin; a round one is as wide as long, and its yaw is 0."""
+        """Draw an obstacle at the origin; for a round one, the yaw is 0 and width equals length."""
         bounds = (self.length, self.width, self.height)
         length, width, height = (float(rng.uniform(*each)) for each in bounds)
         obstacle = Obstacle(self.kind, 0.0, 0.0, yaw, length, width, height)
@@ -59,21 +59,21 @@ class Scatter:
 
 
 class LaneObstacles:
-    """Obstacles in a lane; those that would block it or a door are rejected.
+    """Obstacles in a lane; an obstacle that would block the lane or a door is rejected.
 
     Vehicles pass an obstacle on its wider side. Two obstacles that are passed on the same side may
     stand close together; two that are passed on different sides are a gap apart.
 
     Args:
         route: Middle of the lane, as in `Course`, m, (n, 2).
-        left: Walls on its left.
-        right: Walls on its right.
+        left: Walls on the left of the lane.
+        right: Walls on the right of the lane.
         gap_m: Smallest gap that must remain, m.
 
     Attributes:
         route: Middle of the lane.
-        half_width: Distance of each of its points from the nearest wall, m, (n,).
-        obstacles: The obstacles that fit.
+        half_width: Distance of each point of the route from the nearest wall, m, (n,).
+        obstacles: Obstacles that were not rejected.
         gap_m: Narrowest remaining passage, m.
     """
 
@@ -116,7 +116,7 @@ class LaneObstacles:
 def scatter_obstacles(
     rng: np.random.Generator, obstacles: LaneObstacles, kinds: tuple[Scatter, ...], per_m: float
 ) -> None:
-    """Scatter obstacles over a lane, `per_m` for each metre on average but for those that miss."""
+    """Offer random obstacles to a lane, on average `per_m` for each metre."""
     route, half_width = obstacles.route, obstacles.half_width
     along, left = arc_lengths(route), normals(route)
     shares = [kind.share for kind in kinds]

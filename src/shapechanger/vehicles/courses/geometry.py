@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapechanger.vehicles.courses.course import Course, Obstacle, Wall
 
 Array = NDArray[np.float64]
-"""Numbers with double precision."""
+"""Array of double precision numbers."""
 
 
 def length(line: Array) -> float:
@@ -24,13 +24,16 @@ def length(line: Array) -> float:
 
 
 def arc_lengths(line: Array) -> Array:
-    """Distance along a closed line to each point, and its length, m, (n + 1,)."""
+    """Distances along a closed line to its points, then the length of the line, m, (n + 1,)."""
     steps = np.diff(line, axis=0, append=line[:1])
     return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
 
 def interpolate(line: Array, knots: Array, s: Array) -> Array:
-    """Values, (n, k), interpolated at distances along a closed line, m, which wrap: (m, k)."""
+    """Interpolate values at the points of a closed line, (n, k), at distances `s`, m: (m, k).
+
+    `knots` are the `arc_lengths` of the line; distances wrap around.
+    """
     whole = np.concatenate([line, line[:1]])
     s = np.mod(s, knots[-1])
     columns = [np.interp(s, knots, whole[:, k]) for k in range(whole.shape[1])]
@@ -42,7 +45,8 @@ def resample(line: Array, spacing: float) -> Array:
     knots = arc_lengths(line)
     n = max(8, round(float(knots[-1]) / spacing))
     s = even_distances(float(knots[-1]), n)
-    # Equal arc lengths give unequal chords on a curve; two corrections leave a thousandth.
+    # Equal arc lengths give unequal chords on a curve. After two corrections, chords differ by
+    # a thousandth.
     for _ in range(2):
         chords = arc_lengths(interpolate(line, knots, s))
         s = np.interp(even_distances(float(chords[-1]), n), chords, np.append(s, knots[-1]))
@@ -81,8 +85,9 @@ def turn_angles(line: Array) -> Array:
 def tangent_radii(line: Array) -> Array:
     """Half width to which a lane around a closed line can grow before it overlaps itself, m, (n,).
 
-    It is the radius of the smallest circle that is tangent to the line at a point and passes
-    through another one, like the global radius of curvature (Gonzalez, Maddocks, PNAS 96, 1999).
+    The half width at a point is the radius of the smallest circle that is tangent to the line there
+    and passes through another point, like the global radius of curvature (Gonzalez, Maddocks, PNAS
+    96, 1999).
     """
     x, y = line[:, 0] - line[:, :1], line[:, 1] - line[:, 1:]
     left = normals(line)
@@ -101,10 +106,10 @@ _SIDES = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 def random_loop(rng: np.random.Generator, size: int, pitch_m: tuple[float, float]) -> Array | None:
-    """Draw a loop around `size` cells that are connected by their sides, m, (n, 2).
+    """Draw a loop around `size` grid cells that are connected by their sides, m, (n, 2).
 
-    Rows and columns of cells have random widths in the range of the pitch. Returns None if the
-    cells have holes, or touch at a corner.
+    Rows and columns have random widths in the range `pitch_m`. Returns None if the cells enclose a
+    hole or touch only at a corner.
     """
     cells: set[Cell] = {(0, 0)}
     while len(cells) < size:
@@ -132,7 +137,7 @@ def trace_outline(cells: frozenset[Cell]) -> NDArray[np.int64] | None:
             if (x + i, y + j) not in cells:
                 edges[corners[side]] = corners[(side + 1) % 4]
                 count += 1
-    if len(edges) != count:  # Two edges leave one point: cells touch at a corner.
+    if len(edges) != count:  # Two edges start at the same point, where cells touch at a corner.
         return None
     first = min(edges)
     loop = [first]
@@ -146,7 +151,7 @@ Segments = NDArray[np.float64]
 
 
 def wall_segments(walls: Iterable[Wall]) -> Segments:
-    """Segments on the ground that walls stand on."""
+    """Return the segment on the ground below each wall."""
     return np.array([(*wall.start, *wall.end) for wall in walls], dtype=np.float64).reshape(-1, 4)
 
 
@@ -165,7 +170,7 @@ def any_crossing(pieces: Segments) -> bool:
     start, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
 
     def side(points: Array) -> Array:
-        """Side of each segment (rows) on which each point (columns) is; left is positive."""
+        """Matrix of segments (rows) and points (columns): positive if the point is to the left."""
         x, y = points[:, 0] - start[:, :1], points[:, 1] - start[:, 1:]
         hand = along[:, :1] * y - along[:, 1:] * x
         return np.where(np.abs(hand) < 1e-9, 0.0, hand)
@@ -187,7 +192,7 @@ def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> Array:
     far = distances_to_segments(_CORNERS * size, np.concatenate([starts, ends], axis=1)).min(axis=0)
     for points in (pieces[:, :2], pieces[:, 2:]):
         far = np.minimum(far, _distances_from_points(obstacle, points))
-    # A segment crosses the box if it enters both of its slabs before it leaves one.
+    # A segment crosses the box if it enters both pairs of parallel sides before it leaves a pair.
     ahead = ends - starts
     ahead = np.where(np.abs(ahead) < 1e-12, 1e-12, ahead)
     low, high = (-size / 2.0 - starts) / ahead, (size / 2.0 - starts) / ahead
@@ -223,18 +228,18 @@ def _distances_from_points(obstacle: Obstacle, points: Array) -> Array:
 
 
 def _axes(obstacle: Obstacle) -> Array:
-    """Unit vectors along its length and its width, as rows."""
+    """Unit vectors along an obstacle's length and width, as rows, (2, 2)."""
     c, s = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
     return np.array([[c, s], [-s, c]])
 
 
 def _into(obstacle: Obstacle, points: Array) -> Array:
-    """Array in the frame of an obstacle, along its length and its width."""
+    """Points in the frame of an obstacle: along its length and along its width, m, (n, 2)."""
     return (points - np.array([obstacle.x, obstacle.y])) @ _axes(obstacle).T
 
 
 FAR_M: Final = 2.5
-"""Largest distance that is computed, m; larger ones are reported as this."""
+"""Largest distance that is reported, m; larger distances are reported as this one."""
 
 _CHUNK: Final = 256
 
@@ -251,8 +256,8 @@ class ClearanceField:
     def distance(self, points: Array) -> Array:
         """Distance of each point, m, (N, 2), from the nearest wall or obstacle, m, (N,).
 
-        It is at most `FAR_M`, and 0 inside an obstacle. It is fast if neighbours in the array are
-        close to each other.
+        The distance is at most `FAR_M`, and 0 inside an obstacle. The computation is fast if
+        neighbours in the array are close to each other.
         """
         parts = [self._near(points[i : i + _CHUNK]) for i in range(0, len(points), _CHUNK)]
         return np.concatenate([np.empty(0), *parts])
@@ -269,8 +274,8 @@ class ClearanceField:
         return np.maximum(found, 0.0)
 
 
-# Distance along the line, m, within which a nearest spot is searched around a hint. Parallel legs
-# of a course are much farther apart along the line, so none is mistaken for another.
+# Distance along the line, m, within which the nearest spot is searched around a hint. Neighbouring
+# parts of a course are much farther apart along the line, so they are not confused.
 _WINDOW_M: Final = 2.0
 
 
@@ -290,7 +295,7 @@ class ClosedLine:
     """Closed polyline; the last point is joined to the first.
 
     Args:
-        points: Array, m, (N, 2); neighbours differ.
+        points: Points, m, (N, 2); neighbours must differ.
 
     Attributes:
         points: The points.
@@ -306,28 +311,28 @@ class ClosedLine:
         self.stations: Array = np.concatenate(([0.0], np.cumsum(lengths)[:-1]))
         self.length = float(lengths.sum())
         self._window = int(np.ceil(_WINDOW_M / (self.length / len(points))))
-        # Extended beyond both ends by a window, so that each window is a slice.
+        # Arrays are extended by a window beyond both ends, so that each window is a slice.
         around = np.arange(-self._window, len(points) + self._window) % len(points)
         self._around = np.column_stack((points, self._steps, self._squared))[around].T.copy()
 
     def index(self, station: float) -> int:
-        """Index of the last point at or before a station, m, which wraps around."""
+        """Index of the last point at or before a station, m; stations wrap around."""
         return int(np.searchsorted(self.stations, station % self.length, side="right")) - 1
 
     def at(self, station: float) -> tuple[float, float]:
-        """Point, m, at a station, m, which wraps around."""
+        """Point, m, at a station, m; stations wrap around."""
         i = self.index(station)
         share = (station % self.length - self.stations[i]) / np.sqrt(self._squared[i])
         x, y = self.points[i] + share * self._steps[i]
         return float(x), float(y)
 
     def nearest(self, x: float, y: float, hint: float | None = None) -> Spot:
-        """Nearest spot of the line to a point, m; with a hint, near that station only."""
+        """Spot of the line nearest to a point, m; with a hint, only near that station."""
         if hint is None:
             first, count = 0, len(self.points)
         else:
             first, count = self.index(hint) - self._window, 2 * self._window + 1
-        # Called at each control step, so it makes few and small arrays.
+        # Each control step calls this function, so it makes few and small arrays.
         near = self._around[:, first + self._window : first + self._window + count]
         start_x, start_y, step_x, step_y, squared = near
         away_x, away_y = x - start_x, y - start_y
@@ -341,12 +346,12 @@ class ClosedLine:
         return Spot(station, math.copysign(math.hypot(off_x[best], off_y[best]), cross))
 
     def ahead_by(self, start: float, end: float) -> float:
-        """Shorter way along the line from one station to another, m; backward is negative."""
+        """Length of the shorter way from one station to another, m; negative if backwards."""
         return (end - start + self.length / 2) % self.length - self.length / 2
 
 
 class CourseProgress:
-    """Net distance of a vehicle along the route of a course, lap after lap; backward counts down.
+    """Measures a vehicle's net distance along a route over all laps; driving back reduces it.
 
     Call `reset` first, and after moving the vehicle by more than 2 m.
     """
