@@ -315,12 +315,12 @@ def test_a_finger_given_at_a_reset_moves_as_one_made_with_it() -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ({"goal": True}, "takes no goal: its observations are vectors"),
-        ({"path": "random"}, "takes no path='random': a reset draws no path; name one"),
-        ({"gap": "wide"}, "takes a gap with a finger_seed only: a reset draws no finger by itself"),
+        ({"goal": True}, "supports no goal: its observations are vectors"),
+        ({"path": "random"}, "supports no path='random', because its resets draw no paths"),
+        ({"gap": "wide"}, "needs a finger_seed with a gap, because its resets draw no fingers"),
         (
             {"parameters": {"command_delay": 0.012}},
-            r"no command_delay of 0.012 s, which is a whole number .* so take 0.0118 s",
+            r"no command_delay of 0.012 s: it is a whole number .* Use 0.0118 s",
         ),
     ],
 )

@@ -183,7 +183,7 @@ def test_invalid_options_are_refused(
     [
         ({"actions": "tensions"}, UnknownName, "'tensions'. Did you mean 'tension'"),
         ({"gap": "wide", "parameters": NOMINAL}, FingerError, "Give either parameters or a gap"),
-        ({"finger_seed": 2}, FingerError, "so it needs a gap"),
+        ({"finger_seed": 2}, FingerError, "give a gap too"),
         ({"parameters": {"fricton": 1.0}}, UnknownName, "No parameter of a finger .*'fricton'"),
         ({"parameters": "{}x"}, FingerError, "Invalid finger parameters"),
         ({"reward": {"effrt": 1.0}}, UnknownName, "'effrt'. Did you mean 'effort'"),

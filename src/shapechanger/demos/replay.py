@@ -1,4 +1,4 @@
-"""Replay of an episode in an env, with the differences, and as a video."""
+"""Replay an episode in an env and describe the differences, or write it as a video."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 from shapechanger.reports.films import require_film, write_film
 
-_WITHOUT_CAMERA: Final = (40, 480, 3)  # Shape of an image.
+_WITHOUT_CAMERA: Final = (40, 480, 3)  # Shape of a video frame of an episode without images.
 
 
 def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
-    """Replay an episode in an env from the recorded seed, and return sentences on the differences.
+    """Replay an episode in an env from the recorded seed, and describe the differences.
 
-    Applied actions are replayed if they are known, because they caused the frames; the intended
-    actions of an expert may differ.
+    Applied actions are replayed if they are known, because they caused the recorded images. An
+    expert's intended actions may differ from them.
     """
     header, kept = episode.header, episode.kept
     states: list[NDArray[np.float64]] = []  # Differences.
     images: list[float] = []
     rewards: list[tuple[float, float]] = []
-    # With the recorded arguments if it is the recorded env.
+    # The recorded arguments are used only in the recorded env.
     kwargs = header.env_kwargs if ref.id == header.env else {}
     with closing(EnvRef(ref.id, {**kwargs, **ref.kwargs}).make(max_episode_steps=-1)) as env:
         encoder = ObservationEncoder(env)
@@ -39,8 +39,8 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
         moved, recorded = ([(f.name, f.unit, f.shape) for f in layout] for layout in layouts)
         if moved != recorded:
             raise DemosError(
-                f"{ref} moves {', '.join(encoder.action_layout.names)}, and {episode.path.name} "
-                f"was recorded with {', '.join(header.action_layout.names)}."
+                f"The actions of {ref} are {', '.join(encoder.action_layout.names)}, but "
+                f"{episode.path.name} has {', '.join(header.action_layout.names)}."
             )
         options = cast("Any", header.notes.get("reset_options"))
         observation, info = env.reset(seed=header.seed, options=options)
@@ -78,7 +78,11 @@ def _differences(
     states: NDArray[np.float64],
     rewards: list[tuple[float, float]],
 ) -> Iterator[str]:
-    """Describe the differences of images, of 255; states, shape (n, size); and rewards."""
+    """Describe differences.
+
+    `images` are mean differences of 255 levels, `states` differences, shape (n, size), and
+    `rewards` the rewards recorded and now.
+    """
     if any(images):
         mean = np.mean(images)
         yield f"images differ by {mean:.1f} of 255 on average, {images[-1]:.1f} at the end"
@@ -96,7 +100,7 @@ def _differences(
 
 
 def write_episode_film(episode: Episode, path: Path) -> str:
-    """Write the kept steps of an episode as a video, and return a sentence on it."""
+    """Write the kept steps of an episode as a video, and return a summary."""
     require_film(path)
     layout = episode.header.action_layout
     frames: list[NDArray[Any]] = []
@@ -105,7 +109,7 @@ def write_episode_film(episode: Episode, path: Path) -> str:
         if (jpeg := episode.jpeg(step)) is not None:
             picture = decode_picture(jpeg, f"{episode.path}/frames/{step.frame}")
         frame = overlay(picture, step, layout)
-        if not frames or frame.shape == frames[0].shape:  # A video has one frame size.
+        if not frames or frame.shape == frames[0].shape:  # All frames of a video have one size.
             frames.append(frame)
     write_film(frames, path, episode.header.control_hz)
     left = len(episode.kept) - len(frames)

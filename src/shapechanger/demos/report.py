@@ -18,7 +18,7 @@ from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 from shapechanger.reports.page import jpeg_uri, render
 
-# Images on a page, so that the page of a hundred episodes still opens.
+# Largest number of images on a page, so that browsers can open pages of a hundred episodes.
 _MAX_PICTURES: Final = 600
 _MIN_PER_EPISODE, _MAX_PER_EPISODE = 6, 24
 _MAX_MARKED: Final = 12
@@ -27,11 +27,11 @@ _MAX_WIDTH: Final = 200  # Pixels; wider images are downsampled.
 
 _COLOURS: Final = {driver: "#{:02x}{:02x}{:02x}".format(*COLOURS[driver]) for driver in DRIVERS}
 _DROPPED: Final = "#d5d9de"
-# Colours of the numbers of an action, by Okabe and Ito, like the colours of drivers.
+# Colours of the traces of an action's numbers, from the palette of Okabe and Ito.
 _TRACE_COLOURS: Final = ("#1b1f24", "#d55e00", "#cc79a7", "#56b4e9")
 _MAX_POINTS: Final = 1000
 
-# Numbers of a state that are shown; outputs are shown with the actions.
+# Numbers of a state that are shown as histograms.
 _MEASURED: Final = ("speed", "distance", "battery")
 _MAX_ACTIONS: Final = 12
 _BINS: Final = 21  # Odd, so that 0 has its own bin in a symmetric range.
@@ -41,9 +41,9 @@ class Distribution(NamedTuple):
     """Numbers of the same name and unit.
 
     Attributes:
-        feature: Their name, unit, and range.
-        values: The finite ones, shape (n,), at least one.
-        missing: Number of the others, NaN and infinities.
+        feature: Name, unit and range of the numbers.
+        values: Finite numbers, shape (n,), at least one.
+        missing: Number of NaNs and infinities, which `values` omits.
     """
 
     feature: Feature
@@ -83,8 +83,8 @@ def recording_html(name: str, episodes: Sequence[Episode], broken: Sequence[str]
 
     Args:
         name: Name of the recording.
-        episodes: Its episodes.
-        broken: A sentence for each episode that cannot be read.
+        episodes: Episodes of the recording.
+        broken: A message for each episode that cannot be read.
 
     Raises:
         MissingExtra: If Jinja2 is not installed.
@@ -134,7 +134,7 @@ def _histogram(found: Distribution) -> dict[str, Any]:
 
 
 def _timeline(episode: Episode) -> dict[str, Any]:
-    """Return the drivers, and up to `_MAX_POINTS` points of each action, from -1 to 1."""
+    """Return the runs of each driver, and up to `_MAX_POINTS` points, -1 to 1, of each action."""
     layout, first = episode.header.action_layout, episode.steps[0].index
     runs: list[tuple[int, int, str]] = []
     for who, run in groupby(episode.steps, lambda step: _who(episode, step)):
@@ -162,8 +162,8 @@ def _who(episode: Episode, step: Step) -> str:
 
 
 def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
-    """Up to `most` evenly spaced images of an episode, and those at its marks."""
-    # Times of starts: without the duration of the step itself.
+    """Return up to `most` evenly spaced images of an episode, and the images at its marks."""
+    # Time at which each step starts, s.
     starts_s = accumulate(episode.durations_s, initial=0.0)
     seen = [pair for pair in zip(episode.steps, starts_s, strict=False) if pair[0].frame]
     places = np.linspace(0, len(seen) - 1, min(most, len(seen))).round().astype(int).tolist()
@@ -184,7 +184,7 @@ def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
 
 
 def _thumbnail(episode: Episode, step: Step) -> str:
-    """An image as a data URI; empty if it is damaged."""
+    """Return an image as a data URI, or "" if the image is damaged."""
     try:
         jpeg = episode.jpeg(step) or b""
         picture = decode_picture(jpeg, step.frame)

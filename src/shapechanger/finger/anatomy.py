@@ -27,7 +27,7 @@ PHALANGES: Final = ("proximal", "middle", "distal")
 # "Anthropometric data for describing the kinematics of the human hand", Ergonomics 35:261, as
 # quoted in other models), times 189 mm.
 PHALANX_LENGTH_M: Final = (0.0463, 0.0270, 0.0183)
-# Chosen: half the breadth of an adult's finger at each phalanx.
+# Half the breadth of an adult's finger at each phalanx, a chosen value.
 PHALANX_RADIUS_M: Final = (0.0085, 0.0075, 0.0068)
 TISSUE_DENSITY: Final = 1100.0
 """Density of the finger, kg/m³, between the densities of muscle, 1060, and bone."""
@@ -39,44 +39,43 @@ JOINT_RANGE: Final[NDArray[np.float64]] = np.radians(
 lower end of the knuckle is its hyperextension, 0 to 45 degrees in adults."""
 
 DIP_BY_PIP: Final = 0.6
-"""Ratio of the angles of end joint and middle joint, as the extensor hood and its ligaments
-couple them. Chosen; animators take two thirds (Rijpkema & Girard 1991, "Computer animation of
-knowledge-based human grasping", SIGGRAPH)."""
+"""Angle of the end joint divided by the angle of the middle joint: the extensor hood and its
+ligaments couple them. The value is chosen; animators use two thirds (Rijpkema & Girard 1991,
+"Computer animation of knowledge-based human grasping", SIGGRAPH)."""
 DIP_BAND: Final = math.radians(8.0)
-"""Distance from that angle within which the end joint moves freely, rad. Chosen."""
+"""Distance from the coupled angle within which the end joint moves freely, rad; chosen."""
 DIP_COUPLING: Final = 0.15
-"""Stiffness of the coupling beyond the band, N·m/rad. Chosen so that random commands leave the end
-joint within 16 degrees of that angle, and identification can still distinguish the two joints."""
+"""Stiffness of the coupling beyond `DIP_BAND`, N·m/rad. It is chosen so that random commands keep
+the end joint within 16 degrees of the coupled angle, and identification can still distinguish the
+two joints."""
 
 JOINT_REST: Final[NDArray[np.float64]] = np.radians([25.0, 0.0, 35.0, 21.0])
-"""Equilibrium angles of the passive tissue, rad: the slightly curled finger of a resting hand.
-Chosen."""
+"""Equilibrium angles of the passive tissue, rad, chosen as in a resting, curled hand."""
 
 # For flexion of the knuckle, 0.033 to 0.047 N·m/rad was measured in the middle of its range, in
-# four healthy people (PMC7775510, table 2). The others are chosen, smaller towards the tip.
+# four healthy people (PMC7775510, table 2). The values of the other joints are chosen.
 JOINT_STIFFNESS: Final[NDArray[np.float64]] = np.array([0.04, 0.04, 0.02, 0.008])
 """Passive joint stiffness around the rest angles, N·m/rad."""
 END_STIFFNESS: Final = 4.0
-"""Ratio of a joint's stiffness at the farther end of its range to its stiffness at rest. The torque
-of human knuckles rises exponentially there (fitted by Kuo & Deshpande 2012, J. Biomechanics
-45:2531); a cubic rises similarly. The value is chosen."""
+"""Stiffness of a joint at the farther end of its range, divided by its stiffness at rest. The value
+is chosen. The torque of human knuckles rises exponentially near the end (fitted by Kuo & Deshpande
+2012, J. Biomechanics 45:2531); the cubic used here rises similarly."""
 
 JOINT_DAMPING: Final[NDArray[np.float64]] = np.array([0.015, 0.015, 0.010, 0.005])
-"""Passive joint damping, N·m·s/rad. Chosen so that even full, alternating tensions move no joint
-faster than 50 rad/s."""
+"""Passive joint damping, N·m·s/rad, chosen so that full, alternating tensions move the joints at no
+more than 50 rad/s."""
 
 JOINT_FRICTION: Final[NDArray[np.float64]] = np.array([1.0, 1.0, 0.7, 0.4]) * 1e-3
-"""Coulomb friction of the joints, N·m. Chosen, small: Esteki & Mansour 1996 (J. Biomechanics
-29:443) found losses that hardly grow with speed."""
+"""Coulomb friction of the joints, N·m. The values are chosen. Esteki & Mansour 1996 (J.
+Biomechanics 29:443) found losses that hardly grow with speed."""
 
 # Moment arms, mm. The laboratory of Valero-Cuevas publishes the force and torque at the fingertip
 # of each tendon of a cadaver's index finger (R/main.r of github.com/bc/stfeasibility), in an
 # unspecified posture. FDS and DI have no moment arm at the end joint, so their forces and torques
-# give its lever: 16 mm, with the joint flexed by 10 degrees. The arms below also assume that the
-# knuckle and the middle joint are flexed by 45 degrees, as in other work of that laboratory, and
-# the lengths of the first two phalanges above; a different posture causes small errors. The often
-# quoted arms of An et al. 1983 (J. Biomechanics 16:419) differ from these by up to 4 mm, and with
-# them no set of tensions keeps the finger in equilibrium.
+# determine the fingertip's distance from it, 16 mm, and its flexion, 10 degrees. For the arms
+# below, the knuckle and the middle joint are assumed to be flexed by 45 degrees, as in other work
+# of the laboratory. A different posture causes small errors. The often quoted arms of An et al.
+# 1983 (J. Biomechanics 16:419) differ by up to 4 mm; see `AN_1983_ARMS`.
 _MOMENT_ARMS_MM: Final = {
     "FDP": (8.6, -2.7, 4.9, 3.6),
     "FDS": (9.0, -1.3, 4.0, 0.0),
@@ -91,8 +90,7 @@ MOMENT_ARMS: Final[NDArray[np.float64]] = np.array([_MOMENT_ARMS_MM[t] for t in 
 joint."""
 
 # An, Ueba, Chao, Cooney & Linscheid 1983, "Tendon excursion and moment arm of index finger
-# muscles", J. Biomechanics 16:419. The numbers are recalled, not copied from the paper: check them
-# there before you rely on them.
+# muscles", J. Biomechanics 16:419. The numbers are quoted from memory: check them in the paper.
 _AN_1983_MM: Final = {
     "FDP": (11.1, 1.1, 7.9, 4.1),
     "FDS": (11.9, 1.7, 6.2, 0.0),
@@ -103,19 +101,19 @@ _AN_1983_MM: Final = {
     "PI": (6.6, -5.8, -2.6, -1.6),
 }
 AN_1983_ARMS: Final[NDArray[np.float64]] = np.array([_AN_1983_MM[t] for t in TENDONS]) * 1e-3
-"""Another set of moment arms, m, (7, 4). With these arms no set of tensions is in equilibrium: all
-tensions that extend the knuckle also move another joint, which passive tissue has to hold."""
+"""Another set of moment arms, m, (7, 4). With these arms tendons cannot balance the joints: all
+tensions that extend the knuckle also move another joint, which passive tissue must hold."""
 
-# From the same laboratory and file.
+# From the file of the laboratory of Valero-Cuevas, like the moment arms.
 FORCE_POTENTIAL_N: Final[NDArray[np.float64]] = np.array(
     [123.0, 219.0, 23.52, 91.74, 21.6, 124.8, 129.6]
 )
 """Largest force of each muscle, N."""
 
-# 30 % of the potential, kept between 6 and 25 N. Chosen; hands of cadavers have been pulled with
-# 10 % (Nimbarte, Kaz & Li 2008, J. Orthopaedic Surgery and Research 3).
+# The limits, 30 % of the potential within 6 to 25 N, are chosen. Tendons of cadavers' hands have
+# been pulled with 10 % (Nimbarte, Kaz & Li 2008, J. Orthopaedic Surgery and Research 3).
 MOST_TENSION_N: Final[NDArray[np.float64]] = np.clip(0.3 * FORCE_POTENTIAL_N, 6.0, 25.0)
 """Largest tension of each tendon in the model, N."""
 
 LEAST_TENSION_N: Final = 0.5
-"""Smallest tension of a tendon, which keeps it from hanging slack, N."""
+"""Smallest tension of a tendon, N, which keeps it taut."""

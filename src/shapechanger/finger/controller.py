@@ -1,4 +1,4 @@
-"""Controllers of the finger: for its target, and for motions from which it is identified."""
+"""Controllers of the finger: one reaches the target, one moves for identification."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _ENDS: Final = (-np.ones(len(TENDONS)), np.ones(len(TENDONS)))
 class FingerController:
     """Moves the fingertip to the target in its observation: the upper reference for policies.
 
-    Each step computes the angles for the target at the end of the step (inverse kinematics), the
-    speeds that lead there, the torques that they need by the finger's model (inertia, weight,
-    passive tissue), the tensions that give these torques with the least co-contraction (bounded
-    least squares), and the commands that give those tensions, compensating the motors' lag.
+    Each step computes the angles for the target (inverse kinematics), the speeds that lead there,
+    and the torques for these speeds by the finger's model (inertia, weight, passive tissue). Then
+    it computes the tensions for the torques with the least co-contraction (bounded least squares),
+    and the commands for the tensions, which compensate the motors' lag.
 
-    It uses only observations, so it also drives a finger on a bench; the parameters are assumed.
+    The controller uses only observations and assumed parameters, so it also works on a rig.
 
     Args:
         layout: Layout of the observations.
@@ -85,10 +85,10 @@ class FingerController:
         wanted, _ = angles_for(seen[self._target], angles if self._wanted is None else self._wanted)
         self._wanted = wanted
         speed = np.clip(self._gain * (wanted - angles), -_MOST_SPEED, _MOST_SPEED)
-        # To have this speed by the end of the step.
+        # The finger reaches `speed` by the end of the step.
         acceleration = (speed - seen[self._velocities]) / CONTROL_DT
         torque = joint_torque(self._model, self._data, angles, speed, acceleration)
-        # Lengths change while the command acts, so use those in the middle of the step.
+        # Lengths change while the command acts, so use the lengths in the middle of the step.
         length = -self._arms @ (angles + 0.5 * CONTROL_DT * speed)
         pulling = -self._arms @ speed
         low, high = (self._drive.tension(end, length, pulling) for end in _ENDS)
@@ -100,32 +100,32 @@ class FingerController:
         return np.clip(command, -1.0, 1.0).astype(np.float32)
 
 
-# Frequencies of the motions, Hz. Ten seconds contain several periods of each; delay and lag would
-# blur faster ones.
+# Frequencies of the motions, Hz. Ten seconds contain several periods of each frequency; delay and
+# lag would blur faster motions.
 _SLOWEST_HZ, _FASTEST_HZ = 0.15, 0.9
 _WAVES: Final = 4
-# Above 1, so that signals are near the ends of a range more often than in its middle: moment arms
-# show most where a joint is far from the middle.
+# With a spread above 1, signals are more often near the ends of a range than in its middle. Moment
+# arms have the largest effect near the ends.
 _SPREAD: Final = 1.5
 # Distance of the commanded posture from either end of a joint's range, as a fraction of it.
 _MARGIN: Final = 0.05
-# Largest commanded distance of the end joint from its position under the hood, rad: beyond its
-# band, but within the strength of the tendons.
+# Largest commanded distance of the end joint from its coupled angle, rad: beyond `DIP_BAND`, but
+# within the strength of the tendons.
 _DIP_OFF: Final = math.radians(20.0)
-# Range of the lowest tension, which varies over time, N: a slack tendon reveals nothing about its
-# arms, and a constant tension nothing about its stretch.
+# Range of the lowest tension, which varies over time, N. Slack tendons would not reveal the moment
+# arms, and constant tensions would not reveal the stretch.
 _LEAST_N: Final = (2.0, 4.5)
 # Time constant of the correction of joint errors, s: long enough not to oscillate with delay.
 _BACK_S: Final = 0.25
-# Largest joint error that is corrected, rad, as for a joint that is stuck at its limit.
+# Limit of the corrected joint error, rad, for example if a joint is stuck at its limit.
 _MOST_OFF: Final = 0.4
 
 
 class FingerBabble:
     """Controller that moves the joints along independent smooth random motions.
 
-    It assumes the nominal finger and corrects errors by the measured angles, under tensions that
-    vary over time. It finds the angles by the layout, so it also moves a finger on a bench.
+    The controller assumes the nominal finger, and corrects errors of the measured angles. The
+    lowest tensions vary over time. It also works on a rig, because the layout locates the angles.
 
     Args:
         layout: Layout of the observations, with a feature `JOINT/angle` for each joint.
@@ -134,7 +134,7 @@ class FingerBabble:
         control_dt: Duration of an action, s.
 
     Raises:
-        UnknownName: If the layout lacks an angle, or there is no such mode of action.
+        UnknownName: If the layout lacks an angle, or the mode of action is unknown.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class FingerBabble:
         self._angles = places_of(layout, JOINTS, "angle")
         self._drive = drive_of(actions, NOMINAL)
         rng = np.random.default_rng(seed)
-        # One wave per part of the frequency range, so that no signal has slow waves only.
+        # Each part of the frequency range has one wave, so that every signal has fast waves.
         edges = np.geomspace(_SLOWEST_HZ, _FASTEST_HZ, _WAVES + 1)
         self._joints, self._tendons = (
             (rng.uniform(edges[:-1], edges[1:], shape), rng.uniform(0.0, 2.0 * np.pi, shape))
@@ -168,7 +168,7 @@ class FingerBabble:
         torque = moving_torque(wanted, speed, np.zeros(len(JOINTS))) + self._back * off
         least = _LEAST_N[0] + (_LEAST_N[1] - _LEAST_N[0]) * _signals(self._tendons, t)
         tensions, _ = tensions_for_torque(MOMENT_ARMS, torque, least, MOST_TENSION_N)
-        # Drives that resist a change of length need the lengths of the motion too.
+        # Drives that resist a change of length also need lengths and their rates.
         command = self._drive.command(tensions, -MOMENT_ARMS @ wanted, -MOMENT_ARMS @ speed)
         return np.clip(command, -1.0, 1.0).astype(np.float32)
 
@@ -183,7 +183,7 @@ class FingerBabble:
 
 
 def _signals(waves: tuple[NDArray[np.float64], NDArray[np.float64]], t: float) -> Any:
-    """Return smooth signals at a time, s, mostly near their ends: 0 to 1, (signals,)."""
+    """Return smooth signals at a time, s, that are mostly near 0 or 1: (signals,)."""
     hz, phase = waves
     total = np.sin(2.0 * np.pi * hz * t + phase).sum(axis=1)
     # The sum is nearly normal with a variance of one half per wave, so its cumulative distribution
@@ -192,7 +192,7 @@ def _signals(waves: tuple[NDArray[np.float64], NDArray[np.float64]], t: float) -
 
 
 def places_of(layout: Layout, names: tuple[str, ...], kind: str) -> list[int]:
-    """Return the indices of a quantity of the joints or tendons; refuse a layout without it."""
+    """Return the indices of a quantity, such as "angle", of joints or tendons in a layout."""
     slices = layout.slices
     for name in names:
         _ = layout[f"{name}/{kind}"]

@@ -37,7 +37,7 @@ from shapechanger.finger.visuals import tendon_legend
 from shapechanger.layout import Element, Feature, Layout
 
 _MODES: Final = ("human", "rgb_array", "depth_array")
-# View from the thumb's side, with the workspace and the end of the hand.
+# The camera sees the workspace and the end of the hand from the thumb's side.
 _CAMERA: Final[Mapping[str, Any]] = {
     "lookat": np.array([0.017, 0.0, -0.024]),
     "distance": 0.18,
@@ -45,15 +45,15 @@ _CAMERA: Final[Mapping[str, Any]] = {
     "elevation": -15.0,
 }
 _PICTURE: Final = 480
-# Duration of the motions that a finger is identified from, s.
+# Duration of the recorded motions from which a finger is identified, s.
 _BABBLE_S: Final = 10.0
 
-# Weight of the reward in a source for a rig: fast changes are penalised, because a rig cannot
-# follow.
+# Weight of the reward in envs for policies that transfer to a rig. A rig cannot follow fast
+# changes, so they are penalised.
 _CALM: Final = {"change": 5.0}
 
 SMOOTHNESS: Final = Measure("smoothness", "1", "smoothness", "episode")
-"""1 minus the mean change of a tendon's command per step, over its range of 2."""
+"""1 minus half the mean absolute change of a tendon's command in a step."""
 
 
 class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
@@ -61,10 +61,10 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     Args:
         actions: Meaning of an action; see `shapechanger.finger.tensions.DRIVES`.
-        parameters: Parameters of the finger, as `FingerParameters`, their JSON, some keyed by name,
-            or the name of a set, "an-1983"; by default the nominal finger.
-        gap: Distribution, or its name, that the finger is drawn from instead of `parameters`; see
-            `shapechanger.finger.gap`.
+        parameters: Parameters of the finger: `FingerParameters`, their JSON, a mapping of changed
+            parameters, or the name of a set, "an-1983"; None for the nominal finger.
+        gap: Distribution, or its name, from which the finger is drawn instead of using
+            `parameters`; see `shapechanger.finger.gap`.
         finger_seed: Seed of the finger drawn from the gap; None draws another finger at each reset
             (domain randomisation).
         reward: Weights that replace the default ones, keyed by name.
@@ -78,9 +78,9 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         action_layout: Name, unit and range of each number of the action.
 
     Raises:
-        UnknownName: If there is no such mode of action, gap, parameter, weight or render mode.
-        FingerError: If the parameters contradict themselves, come with a gap, or have moment arms
-            with which the tendons cannot balance a joint.
+        UnknownName: If the mode of action, gap, parameter, weight or render mode is unknown.
+        FingerError: If the parameters contradict each other, if both parameters and a gap are
+            given, or if the moment arms do not let the tendons balance the joints.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it without ClassVar.
@@ -93,7 +93,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     _target: NDArray[np.float64]
 
     def __new__(cls, *arguments: Any, **options: Any) -> Self:
-        """Keep the arguments, with which a copy is pickled."""
+        """Store the arguments for pickling."""
         env = super().__new__(cls)
         EzPickle.__init__(env, *arguments, **options)
         return env
@@ -117,7 +117,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         if gap is not None and parameters is not None:
             raise FingerError("Give either parameters or a gap to draw them from, not both.")
         if gap is None and finger_seed is not None:
-            raise FingerError("finger_seed selects a finger of a gap, so it needs a gap.")
+            raise FingerError("finger_seed selects a finger of a gap: give a gap too.")
         self.render_mode = render_mode
         self.width, self.height = width, height
         self._actions = actions
@@ -149,7 +149,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self.plant.place(JOINT_REST, np.random.default_rng(0))  # Until the first reset.
 
     def _place(self, options: dict[str, Any] | None) -> FingerSenses:
-        """Draw the finger if each episode has another, and put it at a start."""
+        """Draw the finger if each episode has another one, and put the finger at a start."""
         for name in options or {}:
             if name not in self._options:
                 raise UnknownName("option of reset", name, self._options)
@@ -198,7 +198,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @abstractmethod
     def _advance(self) -> None:
-        """Note that the finger has moved for one control period."""
+        """Update the task after the finger has moved for one control period."""
 
     @abstractmethod
     def _observation(self, senses: FingerSenses) -> Any:
@@ -206,7 +206,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @abstractmethod
     def _info(self) -> dict[str, Any]:
-        """Return the entries of `info` that the task has at the start too."""
+        """Return the entries of `info` that both `reset` and `step` return."""
 
     def _terms(self, senses: FingerSenses) -> dict[str, float]:
         """Return the terms of the reward, keyed by name; the reward is their sum."""
@@ -219,10 +219,10 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return float(np.linalg.norm(self.plant.fingertip - self._target))
 
     def render(self) -> Any:
-        """Return a frame of `render_mode`; None without one.
+        """Return a frame of `render_mode`, or None without a render mode.
 
         Raises:
-            RenderError: If nothing can be drawn here.
+            RenderError: If this machine cannot render.
         """
         if self.render_mode is None:
             return None
@@ -242,11 +242,11 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def _pulled(self) -> NDArray[np.float64]:
-        """Tensions over the largest, (7,)."""
+        """Tension of each tendon divided by its largest tension, (7,)."""
         return np.abs(self.plant.data.actuator_force) / self._most
 
     def _shown(self) -> FingerFigure:
-        """Return a figure of the present finger; the simulated model has no visible geoms."""
+        """Return a visible model of the present finger; the simulated model has no visuals."""
         if self._figure is None:
             self._figure = FingerFigure()
         self._figure.show(self.plant.angles, self._pulled, self.plant.data.mocap_pos[0])
@@ -262,7 +262,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """The registered spec, with parameters and gap as JSON has them."""
+        """The registered spec, with parameters and gap as values that JSON can represent."""
         return self._spec
 
     @spec.setter
@@ -275,7 +275,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def motors(self) -> FingerParameters | None:
-        """Motors and path that a rig's profile states; None without a path."""
+        """A nominal finger with the motors and command path of this one; None without a path."""
         own = self.parameters
         if own.path is None:
             return None
@@ -298,10 +298,10 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         Args:
             width: Width in pixels.
             height: Height in pixels.
-            reach: Metres in view around the middle of the finger; None for its own reach.
+            reach: Metres in view around the middle of the finger; None for the finger's reach.
 
         Raises:
-            RenderError: If nothing can be drawn here.
+            RenderError: If this machine cannot render.
         """
         figure = self._shown()
         model = figure.model.__copy__()
@@ -310,27 +310,27 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def individual(self) -> str:
-        """The argument that selects a finger of the gap, if it has several; else empty."""
+        """The argument that selects a finger of the gap, or "" if there is only one finger."""
         return "finger_seed" if self._is_drawn_anew else ""
 
     def randomised_source(self) -> dict[str, Any]:
-        """Arguments that draw fingers among which this one may be."""
+        """Arguments of an env whose random fingers are likely to include this one."""
         return {"gap": "wide", "reward": _CALM}
 
     def identified_source(self, seed: int) -> dict[str, Any]:
         """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
 
-        On a rig's path, parameters of the motors, which a log hardly reveals, are drawn for each
-        episode as in the gap "wide".
+        A log hardly reveals parameters of the motors. For a finger with a command path, they are
+        drawn for each episode as in the gap "wide".
 
         Args:
-            seed: Seed of the motions, which take ten seconds.
+            seed: Seed of the motions, which last ten seconds.
 
         Raises:
             FingerError: If the motions do not suffice, or observations are not a vector.
             MissingExtra: If `mujoco.sysid` is not installed.
         """
-        # An optimiser, which an env that only steps does not need.
+        # Imported here, because an env that only steps does not need the optimiser.
         from shapechanger.finger.identify import identify, record_babble
 
         found = identify(record_babble(self, _BABBLE_S, seed, self._actions)).parameters
@@ -340,15 +340,15 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
 
 FingerLike = FingerParameters | Mapping[str, Any] | str
-"""A finger as an argument: parameters, their JSON, some keyed by name, or the name of a set."""
+"""A finger: parameters, their JSON, a mapping of changed parameters, or the name of a set."""
 
 
 def as_finger(value: FingerLike | None) -> FingerParameters:
-    """Return a finger whose tendons can hold it; the nominal one for None.
+    """Return the parameters of a finger; the nominal finger for None.
 
     Raises:
-        UnknownName: If there is no such set or parameter.
-        FingerError: If the parameters contradict themselves, or the tendons cannot balance a joint.
+        UnknownName: If a set or parameter is unknown.
+        FingerError: If the parameters contradict each other, or the tendons cannot balance a joint.
     """
     given: Any = NOMINAL if value is None else value
     if isinstance(given, str):
@@ -365,7 +365,7 @@ def as_finger(value: FingerLike | None) -> FingerParameters:
         raise FingerError(f"Parameters of a finger must be numbers or JSON, got {given!r}.")
     if given not in PARAMETER_SETS.values() and not spans_all_torques(given.arms):
         raise FingerError(
-            "The tendons cannot balance the joints: there is a torque that no tensions give with "
-            "these moment arms, because tendons only pull."
+            "The tendons cannot balance the joints: tendons only pull, so with these moment arms "
+            "no tensions produce some of the torques."
         )
     return given

@@ -15,17 +15,18 @@ from shapechanger.errors import FingerError, UnknownName
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters, converted
 from shapechanger.finger.tensions import spans_all_torques
 
-# Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
+# Largest number of draws. Fingers whose tendons cannot balance the joints are rejected: one in
 # two hundred with arm errors of 25 %.
 _TRIES: Final = 1000
 
-# Parameters that are drawn by their logarithm.
+# Parameters that are drawn log-uniformly.
 _LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"})
 
-# Relative errors of identified arms and stretch, and of joints: `benchmarks.finger_identify`.
+# Relative errors of identified arms and stretch, and of identified stiffness, damping and friction
+# of joints; measured by `benchmarks.finger_identify`.
 _FOUND: Final = 0.03
 _JOINTS_FOUND: Final = 0.2
-# Spread around an identified delay, s. Chosen: most errors are smaller (`benchmarks.finger_path`).
+# Largest error of an identified delay, s: chosen, few errors are larger (`benchmarks.finger_path`).
 _DELAY_FOUND_S: Final = 0.005
 
 Range = tuple[float, float]
@@ -39,21 +40,21 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         joint_factor: Factor of the stiffness, damping and friction of each joint, drawn
             log-uniformly.
         strength: Factor of the largest tensions.
-        tendon_friction: N.
-        tendon_stiffness: N/m, drawn log-uniformly.
-        backlash: m.
-        motor_kg: kg, drawn log-uniformly.
-        motor_lag: s.
-        command_delay: s.
+        tendon_friction: Friction of each tendon, N.
+        tendon_stiffness: Stiffness of each tendon, N/m, drawn log-uniformly.
+        backlash: Backlash of each tendon, m.
+        motor_kg: Mass of each motor at its tendon, kg, drawn log-uniformly.
+        motor_lag: Time constant of the motors, s.
+        command_delay: Delay of commands, s.
         joint_noise: Standard deviation of measured angles, rad.
         tension_noise: Standard deviation of measured tensions, N.
-        tendon_damping: N·s/m.
-        least_tension: N.
-        around: The finger that errors and factors refer to; all fingers have its path of commands.
+        tendon_damping: Damping of each tendon, N·s/m.
+        least_tension: Smallest tension, N.
+        around: Finger that errors and factors refer to; all drawn fingers have its command path.
 
     Raises:
-        FingerError: If a range is empty, not finite or negative, begins at 0 where logarithms are
-            drawn, or `arm_error` is not in [0, 1).
+        FingerError: If a range is empty, not finite or negative, or begins at 0 although it is
+            drawn log-uniformly, or if `arm_error` is not in [0, 1).
     """
 
     arm_error: float
@@ -77,15 +78,15 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         for name in self.__struct_fields__[1:-1]:
             value = getattr(self, name)
             if not 0.0 <= value[0] <= value[1] < math.inf:
-                raise FingerError(f"{name}: the range {value} is empty, infinite or below zero.")
+                raise FingerError(f"{name}: a range must be 0 <= low <= high < inf, got {value}.")
             if name in _LOGARITHMIC and not value[0] > 0.0:
                 raise FingerError(f"{name}: the range {value} must begin above zero.")
 
     def draw(self, rng: np.random.Generator) -> FingerParameters:
-        """Draw a finger whose tendons can hold it.
+        """Draw a finger whose tendons can balance its joints.
 
         Raises:
-            FingerError: If hardly any finger of the gap qualifies.
+            FingerError: If the tendons of hardly any finger of the gap can balance the joints.
         """
         values: dict[str, Any] = {"moment_arms": self._arms(rng)}
 
@@ -111,14 +112,14 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if spans_all_torques(arms):
                 return arms
         raise FingerError(
-            f"With moment arms off by {self.arm_error:.0%}, hardly any finger's tendons can hold "
-            "it: make arm_error smaller."
+            f"With moment arms off by {self.arm_error:.0%}, tendons can hardly ever balance the "
+            "joints: make arm_error smaller."
         )
 
 
 _DEGREE: Final = math.radians(1.0)
 
-# Rates, slew and tensions of the shipped profile; a test compares them.
+# Rates, slew and tensions of the rig profile in this package; a test compares them.
 _RIG: Final = NOMINAL.replace(
     path=CommandPath(control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0)
 )
@@ -127,24 +128,24 @@ _RIG_LEAST_N: Final = 1.0
 
 # A finger on the shipped rig: seven XL330-M077 with spools of 1 cm.
 _REAL_LIKE: Final = Gap(
-    # Chosen; the two published sets in `anatomy` differ by two fifths in the median.
+    # A chosen value; the two sets of moment arms in `anatomy` differ by 40 % in the median.
     arm_error=0.2,
-    # Knuckles of four healthy people had 0.7 to 1.2 of the nominal stiffness (PMC7775510,
-    # table 2); the rest is chosen.
+    # The stiffness of four healthy people's knuckles was 0.7 to 1.2 of the nominal one
+    # (PMC7775510, table 2). The range is chosen around these values.
     joint_factor=(0.7, 1.4),
-    # The rig pulls 1 to 15 N of 25 N.
+    # The rig pulls with 1 to 15 N; the nominal finger with up to 25 N.
     strength=(0.55, 0.65),
     least_tension=(1.0, 1.0),
-    # Rotors at the tendon have 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's numbers
-    # (`shapechanger/robot/drivers/servos/servos.toml`) divided by the spool's radius.
+    # Seen from the tendon, a rotor has 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's
+    # numbers (`shapechanger/robot/drivers/servos/servos.toml`) converted by the spool's radius.
     motor_kg=(1.2, 1.6),
     tendon_damping=(3.0, 5.0),
     tendon_friction=(0.3, 0.8),
-    # The current takes 1 ms to settle, and a command waits up to 10 ms for the guard's
-    # tick, exactly so long on a twin.
+    # The current takes 1 ms to settle. A command waits for the guard's tick: up to 10 ms on a
+    # rig, and exactly 10 ms on a twin.
     motor_lag=(0.001, 0.005),
     command_delay=(0.005, 0.015),
-    # Cords of some decimetres have 5 to 20 N/mm. Chosen.
+    # Chosen for cords with a length of some decimetres: 5 to 20 N/mm.
     tendon_stiffness=(5e3, 20e3),
     backlash=(0.0, 0.5e-3),
     # An AS5600 has 0.09 degrees per count; a magnet off its axis errs by up to a degree.
@@ -156,7 +157,7 @@ _REAL_LIKE: Final = Gap(
 GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
     {
         "real-like": _REAL_LIKE,
-        # For policies that must cope with all of them: slightly more than the one above. Chosen.
+        # Ranges for training robust policies, chosen slightly wider than in "real-like".
         "wide": msgspec.structs.replace(
             _REAL_LIKE,
             arm_error=0.25,
@@ -178,7 +179,7 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
 def with_gears(parameters: FingerParameters) -> FingerParameters:
     """Return the same finger on geared servos.
 
-    Mass, damping, friction and lag of the motors are the middle of their ranges in "real-like".
+    Mass, damping, friction and lag of the motors are in the middle of their ranges in "real-like".
     """
     rig = GAPS["real-like"]
     return parameters.replace(
@@ -197,8 +198,8 @@ def shipped_rig() -> FingerParameters:
 def geared_around(found: FingerParameters) -> Gap:
     """Return the gap of a finger on geared servos after identification.
 
-    Path, arms, joints, stretch and delay are those identified, within their errors; parameters of
-    the motors, which a log hardly reveals, keep their ranges in "wide".
+    Path, arms, joints, stretch and delay are identified, and drawn within their errors. A log
+    hardly reveals parameters of the motors, so they keep their ranges in "wide".
     """
     late = found.command_delay + _DELAY_FOUND_S
     stiffness = found.tendon_stiffness or GAPS["wide"].tendon_stiffness[1]
@@ -217,10 +218,10 @@ def geared_around(found: FingerParameters) -> Gap:
 
 
 def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:
-    """Return a gap, given itself, its name or its ranges.
+    """Return the gap for a `Gap`, a name or a mapping of ranges.
 
     Raises:
-        UnknownName: If there is no gap of this name.
+        UnknownName: If the name is unknown.
         FingerError: If the ranges are malformed.
     """
     if isinstance(value, Gap):

@@ -1,7 +1,7 @@
 """The finger on a device: its command path, senses and tasks as functions of tensors.
 
-All but the physics is computed in double precision, so that tensions are rounded down to the same
-step, and a slow slew adds up to the same tension, as on a CPU.
+Only the physics uses single precision. The command path uses double precision, so that its
+tensions are rounded to the same steps as on a CPU.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from shapechanger.finger.track import FOLLOWS_M, SEEN_S, SETTLING_STEPS, FingerT
 
 _J: Final = len(JOINTS)
 _T: Final = len(TENDONS)
-# Streams of random numbers; the measurements of step n have the stream `_SENSES + n`.
+# Numbers of random streams; measurements of step n use the stream `_SENSES + n`.
 _STARTS: Final = 0
 _TARGETS: Final = 1
 _SENSES: Final = 2
 
 
 class DeviceFinger(Worlds):
-    """Fingers with any parameters, whose fingertip has a target; `plant` is the first finger's."""
+    """Batch of fingers with any parameters and a target each; `plant` is the first finger."""
 
     precision = torch.float64
 
@@ -52,7 +52,7 @@ class DeviceFinger(Worlds):
         self._gives, self._held = parameters.gives, plant.held
         self._noisy = parameters.joint_noise > 0.0, parameters.tension_noise > 0.0
         super().__init__(env, model, *args, **kwargs)
-        # Where the former controls of each actuator are: after two settings and their times.
+        # Indices of each actuator's former controls, which follow two settings and the times.
         samples = int(model.actuator_history[0, 0])
         first = np.asarray(model.actuator_historyadr) + 2 + samples
         self._former = torch.as_tensor(
@@ -102,16 +102,16 @@ class DeviceFinger(Worlds):
 
     @abstractmethod
     def _draw(self, mask: Tensor) -> Tensor:
-        """Set new targets of some worlds, and return start angles of all, rad, shape (n, 4)."""
+        """Set targets of the masked fingers, and return start angles of all, rad, (n, 4)."""
 
     @abstractmethod
     def _follow(self) -> None:
-        """Note a step: `_steps` and the fingertips are new."""
+        """Update the task after a step, when `_steps` and the fingertips are new."""
 
     @property
     @abstractmethod
     def _succeeds(self) -> Tensor:
-        """Whether each finger does its task, shape (n,)."""
+        """Whether each finger has reached the goal of its task, shape (n,)."""
 
     @override
     def apply(self, actions: Tensor) -> None:
@@ -137,7 +137,7 @@ class DeviceFinger(Worlds):
         self._follow()
 
     def _controls(self, constants: dict[str, Tensor]) -> Tensor:
-        """Return the controls of the present tensions on the path, as `HeldTensions` does."""
+        """Return the controls for the command path's tensions, like `HeldTensions`."""
         least, most, step = constants["least"], constants["most"], constants["step"]
         tensions = least + self._shares * (most - least)
         rounded = shares(torch.floor(tensions / step) * step, least, most)
@@ -146,13 +146,13 @@ class DeviceFinger(Worlds):
     def _lengths(self) -> tuple[Tensor, Tensor]:
         """Return lengths at the motors, m, and their rates, m/s, shape (n, 7) each."""
         qpos, qvel = self.qpos.to(self.precision), self.qvel.to(self.precision)
-        if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
+        if self._gives:  # Elastic tendons: winding up by 1 m shortens a tendon by 1 m.
             return -qpos[:, _J:], -qvel[:, _J:]
         arms = self.constants["arms"]
         return -_turned(arms, qpos), -_turned(arms, qvel)
 
     def _measure(self, mask: Tensor | None) -> None:
-        """Measure after a step, or where a mask is given after a start in some worlds."""
+        """Measure all fingers after a step, or the masked fingers after their start."""
         angles = true = self.qpos[:, :_J].to(self.precision)
         tensions = self.actuator_force.abs().to(self.precision)
         if any(self._noisy):
@@ -180,7 +180,7 @@ class DeviceFinger(Worlds):
     @override
     def observations(self) -> Tensor:
         tip = self._seen_tip
-        # Points of which the first is the target: (n, k, 3).
+        # Points (n, k, 3); the first of the k points is the target.
         points = self._target[:, None] if self._ahead is None else self._ahead
         offsets = (points - tip[:, None]).flatten(1)
         return torch.cat([self._senses, tip, points[:, 0], offsets], dim=1).to(self.qpos.dtype)
@@ -245,9 +245,8 @@ class DeviceReach(DeviceFinger):
 class DeviceTrack(DeviceFinger):
     """Fingers that follow a path.
 
-    Paths are functions of NumPy: their points, and the first angles at them, are computed on the
-    CPU from times that are known there. So a step reads from the device which worlds have started,
-    and copies points to it.
+    Points of the path and start angles are computed on the CPU, because paths are NumPy functions.
+    A step therefore copies a mask of the started fingers from the device, and points to it.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -286,7 +285,7 @@ class DeviceTrack(DeviceFinger):
 
     @property
     def _rms(self) -> Tensor:
-        """Root mean square of the distances so far, m, infinite before the first, shape (n,)."""
+        """Root mean square of the distances counted so far, m, shape (n,); infinite without any."""
         counted = (self._steps - SETTLING_STEPS).clip(0)
         return torch.where(counted > 0, (self._squares / counted).sqrt(), torch.inf)
 
@@ -301,11 +300,11 @@ class DeviceTrack(DeviceFinger):
 
 
 FINGERS: Final = {FingerReachEnv: DeviceReach, FingerTrackEnv: DeviceTrack}
-"""Batched functions of fingers by the class of their CPU env."""
+"""Classes of batched fingers, keyed by the class of their CPU env."""
 
 
 def _put(target: Tensor, mask: Tensor, values: Tensor) -> None:
-    """Write rows of values, shape (n, ...), into the worlds of a mask, shape (n,)."""
+    """Replace the masked rows of a target by rows of values, shape (n, ...); mask: (n,)."""
     chosen = mask.view(-1, *[1] * (target.dim() - 1))
     target.copy_(torch.where(chosen, values.to(target.dtype), target))
 
@@ -316,7 +315,7 @@ def _turned(arms: Tensor, angles: Tensor) -> Tensor:
 
 
 def _fingertip(angles: Tensor) -> Tensor:
-    """Return the fingertips of angles, rad, shape (n, 4), as m, shape (n, 3)."""
+    """Return the fingertips, m, shape (n, 3), at joint angles, rad, shape (n, 4)."""
     turned = directions(angles)
     cos, sin = [angle.cos() for angle in turned], [angle.sin() for angle in turned]
     return torch.stack(tip_at(cos, sin), dim=1)
@@ -327,7 +326,7 @@ _WHOLE: Final = 1e-6
 
 
 class FingerReader(BodyReader):
-    """Compiles fingers of a CPU env's task, and reads the numbers that a device needs.
+    """Compiles fingers for a CPU env's task, and extracts the numbers that a device needs.
 
     Raises:
         VectorEnvError: If the env has goals, or draws another finger at each reset.
@@ -339,29 +338,30 @@ class FingerReader(BodyReader):
         self.spec = env.spec
         individual = self._env.individual
         if isinstance(env.observation_space, gym.spaces.Dict):
-            raise VectorEnvError("backend='warp' takes no goal: its observations are vectors.")
+            raise VectorEnvError("backend='warp' supports no goal: its observations are vectors.")
         if getattr(self._env, "path_is_random", False):
             raise VectorEnvError(
-                "backend='warp' takes no path='random': a reset draws no path; name one."
+                "backend='warp' supports no path='random', because its resets draw no paths: "
+                "name a path."
             )
         if individual:
             raise VectorEnvError(
-                f"backend='warp' takes a gap with a {individual} only: a reset draws no finger by "
-                "itself; hand drawn ones with bodies=[...] and options={'bodies': [...]}."
+                f"backend='warp' needs a {individual} with a gap, because its resets draw no "
+                "fingers: pass drawn fingers as bodies=[...] and options={'bodies': [...]}."
             )
 
     @override
     def body(self, value: FingerLike | None) -> FingerParameters:
-        """Return the parameters of a finger; None gives the env's; see `as_finger`."""
+        """Return the parameters of a finger (see `as_finger`); None is the env's finger."""
         return self._env.parameters if value is None else as_finger(value)
 
     @override
     def read(self, body: FingerParameters) -> tuple[DeviceBody, MakeWorlds]:
-        """Return a compiled finger, and the maker of a batch that begins with it.
+        """Return a compiled finger, and a function that makes a batch with it as the first finger.
 
         Raises:
-            VectorEnvError: If its delay is a whole number of simulation steps.
-            FingerError: If its path does not fit the steps.
+            VectorEnvError: If the command delay is a whole number of simulation steps.
+            FingerError: If the command path does not fit the simulation steps.
         """
         env = self._env
         plant = FingerPlant(body, env.drive)
@@ -389,7 +389,7 @@ class FingerReader(BodyReader):
 
 
 def _numbers(plant: FingerPlant) -> dict[str, NDArray[Any]]:
-    """Return the numbers of a finger that its task reads."""
+    """Return the numbers of a finger that its task uses."""
     parameters, data = plant.parameters, cast("Any", plant.data)
     path = parameters.path
     rise, fall = (math.inf, math.inf) if path is None else slews(path)
@@ -413,17 +413,17 @@ def _numbers(plant: FingerPlant) -> dict[str, NDArray[Any]]:
 
 
 def _device_delay(parameters: FingerParameters, timestep: float) -> float:
-    """Return a delay, s, with the same controls at each simulation step, s, as a finger's."""
+    """Return a delay, s, that delays controls by as many simulation steps as a finger's delay."""
     delay = parameters.command_delay
     steps = delay / timestep
     if delay > 0.0 and abs(steps - round(steps)) < _WHOLE * steps:
         raise VectorEnvError(
-            f"backend='warp' takes no command_delay of {delay:g} s, which is a whole number of "
-            f"simulation steps, {timestep:g} s: rounding makes it a step longer at times on a CPU, "
-            f"so take {delay - 0.1 * timestep:g} s, which never is."
+            f"backend='warp' supports no command_delay of {delay:g} s: it is a whole number of "
+            f"simulation steps of {timestep:g} s, and rounding sometimes makes it a step longer "
+            f"on a CPU. Use {delay - 0.1 * timestep:g} s."
         )
-    # A delay ends at a step, so that it may as well end half a step before, where single precision
-    # decides the same way.
+    # A delay takes effect at the next step. If it ends half a step earlier, the effect is the same,
+    # and rounding in single precision cannot change the step.
     return (math.ceil(steps) - 0.5) * timestep if delay > 0.0 else 0.0
 
 

@@ -39,16 +39,16 @@ from shapechanger.finger.visuals import (
 SIM_DT: Final = 0.002
 """Simulation step, s, that is stable under any command."""
 _SIM_DT_STRETCHED: Final = 0.0005
-"""Simulation step with tendons that stretch, s: a light spool on a stiff spring oscillates at 100
-Hz and more."""
+"""Simulation step with elastic tendons, s: a light spool on a stiff tendon oscillates at 100 Hz and
+more."""
 _SIM_DT_GEARED: Final = 0.001
-"""Simulation step with tendons that stretch and geared motors, s: they oscillate at some 20 Hz. The
-error of each step is a row of `python -m benchmarks.run finger-physics`."""
+"""Simulation step with elastic tendons and geared motors, s, which oscillate at some 20 Hz. `python
+-m benchmarks.run finger-physics` shows the error of each step."""
 _GEARED_KG: Final = 0.5
 """Mass above which motors count as geared, kg."""
 
-# Shortest history of commands that a motor with a delay keeps, s, so that fingers with different
-# delays have arrays of the same shapes.
+# Shortest history of commands of a motor with a delay, s. Fingers with shorter delays keep the same
+# history, so their arrays have the same shapes.
 _KEPT_S: Final = 0.020
 
 FINGERTIP: Final = "fingertip"
@@ -62,7 +62,7 @@ TARGET: Final = "target"
 _CABLE_DAMPING_RATIO: Final = 0.3
 _SKIN: Final = (0.87, 0.68, 0.58, 1.0)
 _HAND: Final = (0.75, 0.57, 0.48, 1.0)
-# Radius equal to the tolerance of a reached target.
+# The radius of the target's mark is the tolerance of a reached target.
 _MARK: Final = (0.10, 0.55, 0.25, 0.45)
 _MARK_RADIUS_M: Final = 0.005
 # Length of the metacarpal, two thirds of a palm, for images only.
@@ -70,8 +70,8 @@ _METACARPAL_M: Final = 0.060
 # Phalanx that each joint moves, and its axis: y flexes, and z abducts.
 _Y: Final = (0.0, 1.0, 0.0)
 _HINGES: Final = ((0, _Y), (0, (0.0, 0.0, 1.0)), (1, _Y), (2, _Y))
-# Joint limits: the smallest stable time constant, s, and a damping ratio; and an impedance that
-# hardly yields under full tension.
+# Joint limits: the smallest stable time constant, s, a damping ratio, and an impedance with which
+# the limits hardly yield under full tension.
 _LIMIT: Final = (2.0 * SIM_DT, 1.0)
 _LIMIT_IMPEDANCE: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
 
@@ -83,9 +83,8 @@ def build_finger(
 
     Controls are the commands of the drive, -1 to 1, in the order of `TENDONS`. If the parameters
     have a command path, controls are tensions instead: -1 is the least and 1 the most tension; see
-    `HeldTensions`. Tendons have the names
-    of `TENDONS`, and lengths relative to the straight finger, m. A tendon that stretches has a
-    motor: a slide joint such as `FDP/motor`, whose travel winds it up.
+    `HeldTensions`. Tendons are named as in `TENDONS`. Their lengths, m, are 0 for the straight
+    finger. An elastic tendon has a motor: a slide joint such as `FDP/motor` that winds it up.
 
     Args:
         parameters: Parameters of the finger.
@@ -109,7 +108,7 @@ def build_finger(
         drive = TendonDrive(parameters.least_tension + half, half)
     for i in range(len(TENDONS)):
         _add_tendon(spec, i, parameters, drive)
-    # The extensor hood: a spring that the end joint feels beyond its band.
+    # The extensor hood is a spring that acts on the end joint outside of `DIP_BAND`.
     hood = spec.add_tendon(name=HOOD)
     hood.wrap_joint(JOINTS[2], -DIP_BY_PIP)
     hood.wrap_joint(JOINTS[3], 1.0)
@@ -137,7 +136,7 @@ def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
     for k, name in enumerate(PHALANGES):
         length, radius = PHALANX_LENGTH_M[k], PHALANX_RADIUS_M[k]
         body = parent.add_body(name=name, pos=[at, 0, 0])
-        # Length of the bone with its caps, which overlap at the joints.
+        # The caps of the capsules overlap at the joints.
         body.add_geom(
             name=name,
             type=capsule,
@@ -149,7 +148,7 @@ def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
         for j in (j for j, (moved, _) in enumerate(_HINGES) if moved == k):
             stiffness = parameters.joint_stiffness[j]
             farther = max(abs(JOINT_RANGE[j] - JOINT_REST[j]))
-            # The torque k x + c x³ is END_STIFFNESS times as stiff at the end as at rest.
+            # The stiffness of the torque k x + c x³ at the end is END_STIFFNESS times k.
             rise = (END_STIFFNESS - 1.0) / (3.0 * farther**2)
             body.add_joint(
                 name=JOINTS[j],
@@ -168,7 +167,7 @@ def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
 
 
 def _add_path(spec: mujoco.MjSpec, name: str, arms: tuple[float, ...]) -> mujoco.MjsTendon:
-    """Add a tendon as a weighted sum of angles: flexion shortens a flexor by its moment arm."""
+    """Add a tendon whose length is minus the sum of joint angles times moment arms."""
     path = spec.add_tendon(name=name)
     for joint, arm in zip(JOINTS, arms, strict=True):
         path.wrap_joint(joint, -arm)
@@ -203,11 +202,11 @@ def _add_tendon(
             damping=[parameters.tendon_damping, 0.0, 0.0],
             frictionloss=parameters.tendon_friction,
         )
-        # The spring between motor and finger, whose length is the stretch.
+        # This tendon is the spring between motor and finger; its length is the stretch.
         cable = _add_path(spec, f"{name}/stretch", arms)
         cable.wrap_joint(target, 1.0)
         cable.stiffness = [parameters.tendon_stiffness, 0.0, 0.0]
-        # It only pulls; below the backlash it is slack.
+        # The spring only pulls; it is slack if the stretch is below the backlash.
         cable.springlength = [-1e3, parameters.backlash]
         critical = 2.0 * math.sqrt(parameters.tendon_stiffness * parameters.motor_kg)
         cable.damping = [_CABLE_DAMPING_RATIO * critical, 0.0, 0.0]
@@ -225,7 +224,7 @@ def _add_tendon(
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
     )
     motor.dynprm[0] = parameters.motor_lag
-    # Travel shortens the tendon, so length and speed have the opposite sign.
+    # Travel of a motor shortens its tendon, so length and speed have opposite signs.
     rest = 1.0 - drive.muscle_stiffness * drive.rest[i]
     muscle = np.array([sign * rest, -drive.muscle_stiffness, -drive.muscle_damping])
     motor.gainprm[:3] = drive.gain[i] * muscle
@@ -256,7 +255,7 @@ class FingerFigure:
     ) -> None:
         """Set joint angles, rad, (4,), and the target of the fingertip, m, (3,).
 
-        `pulled` are the tensions as fractions of the largest ones, (7,), shown as thickness.
+        `pulled` are tensions divided by the largest tensions, (7,); they set the tendons' widths.
         """
         widths = THINNEST_M + (THICKEST_M - THINNEST_M) * pulled.clip(0.0, 1.0)
         for courses, width in zip(self._courses, widths, strict=True):
@@ -288,7 +287,7 @@ _UNITS: Final[Mapping[str, str]] = {
     "slew_down_per_s": "ranges per second",
     "tension_step": "N",
 }
-# Attributes of MJCF elements with the arrays of the compiled model that hold them exactly. All
+# Attributes of MJCF elements, and the arrays of the compiled model with their exact values. All
 # joints have one degree of freedom.
 _EXACT: Final[Mapping[str, Mapping[str, str]]] = {
     "joint": {
@@ -318,7 +317,7 @@ _EXACT: Final[Mapping[str, Mapping[str, str]]] = {
 
 
 def finger_mjcf(parameters: FingerParameters, drive: TendonDrive) -> str:
-    """Return the MJCF of a finger with its anatomy, parameters and, as a comment, its limits.
+    """Return the MJCF of a finger with its anatomy and parameters, and its limits as a comment.
 
     Controls are the commands of the drive, or tensions if the parameters have a command path.
     """
@@ -356,7 +355,7 @@ def _text(value: Any) -> str:
 
 
 def _custom(parameters: FingerParameters) -> ElementTree.Element:
-    """Return the parameters as numbers, each with a text for its unit."""
+    """Return a `custom` element with each parameter as a `numeric`, and its unit as a `text`."""
     custom = ElementTree.Element("custom")
     values = msgspec.structs.asdict(parameters)
     path = values.pop("path")
@@ -380,11 +379,11 @@ def _limits(parameters: FingerParameters) -> str:
     if path is not None:
         slews = [f"{v:g}" if v else "unlimited" for v in (path.slew_per_s, path.slew_down_per_s)]
         comments.append(
-            f"Nor how commands are sent: tensions are computed at {path.control_hz:g} Hz, sent at "
+            f"Not simulated either: tensions are computed at {path.control_hz:g} Hz, sent at "
             f"{path.tick_hz:g} Hz, with a slew of {slews[0]} up and {slews[1]} down, in ranges per "
             f"second, and steps of {path.tension_step:g} N. The controls are tensions from the "
             "least to the most."
         )
     delay = f"{1e3 * parameters.command_delay:g} ms"
-    comments.append(f"The actuators have the delay of the commands, {delay} (needs MuJoCo 4).")
+    comments.append(f"The actuators delay commands by {delay} (needs MuJoCo 4).")
     return " " + "\n  ".join(comments) + " "

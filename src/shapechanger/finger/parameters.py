@@ -42,7 +42,7 @@ _T = TypeVar("_T")
 
 
 def converted(failure: str, value: Any, kind: type[_T]) -> _T:
-    """Convert builtin values to a struct; raise FingerError, which begins with `failure`."""
+    """Convert builtin values to a struct, or raise a FingerError that begins with `failure`."""
     try:
         return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
@@ -50,10 +50,10 @@ def converted(failure: str, value: Any, kind: type[_T]) -> _T:
 
 
 class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the commands of a rig become tensions; names and units are its profile's.
+    """Path from the commands of a rig to tensions, with the names and units of its profile.
 
-    Without a path, the tensions follow commands, lengths and speeds in each simulation step. Lag
-    and delay are `motor_lag` and `command_delay` of `FingerParameters`, with a path or without.
+    Without a path, each simulation step computes tensions from commands, lengths and speeds. Lag
+    and delay are fields of `FingerParameters`, with or without a path.
 
     Attributes:
         control_hz: Rate at which tensions are computed from commands, lengths and speeds, and then
@@ -91,12 +91,12 @@ class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Mechanics of a finger, and errors of its drives and sensors; the defaults are nominal.
+    """Mechanics of a finger and errors of its drives and sensors; by default the nominal finger.
 
     Attributes:
         moment_arms: Torque about each joint per newton of each tendon, m, 7 x 4.
         most_tension: Largest tension of each tendon, N.
-        least_tension: Smallest tension of each tendon, which keeps it from hanging slack, N.
+        least_tension: Smallest tension of each tendon, N, which keeps tendons taut.
         joint_stiffness: Passive stiffness of the joints, N·m/rad.
         joint_damping: Passive damping of the joints, N·m·s/rad.
         joint_friction: Coulomb friction of the joints, N·m.
@@ -109,13 +109,12 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         command_delay: Delay of the commands, s.
         joint_noise: Standard deviation of a measured angle, rad.
         tension_noise: Standard deviation of a measured tension, N.
-        path: Path of the commands on a rig, or its values keyed by name; None if the motors follow
-            commands, lengths and speeds without one.
+        path: Command path of a rig, or its values keyed by name; None for a finger without a path.
 
     Raises:
         FingerError: If a number is not finite or has the wrong sign, an array has the wrong shape,
             or a backlash is given without a stiffness.
-        UnknownName: If the path has no such value.
+        UnknownName: If the name of a path's value is unknown.
     """
 
     moment_arms: Arms = tuple(map(tuple, MOMENT_ARMS.tolist()))  # pyright: ignore[reportAssignmentType]
@@ -124,12 +123,12 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     joint_stiffness: tuple[float, ...] = tuple(JOINT_STIFFNESS.tolist())
     joint_damping: tuple[float, ...] = tuple(JOINT_DAMPING.tolist())
     joint_friction: tuple[float, ...] = tuple(JOINT_FRICTION.tolist())
-    tendon_damping: float = 2.0  # Chosen.
+    tendon_damping: float = 2.0  # A chosen value.
     tendon_friction: float = 0.0
     tendon_stiffness: float | None = None
     backlash: float = 0.0
-    motor_kg: float = 0.010  # Chosen, without gears; geared servos have a hundred times more.
-    motor_lag: float = 0.020  # Chosen.
+    motor_kg: float = 0.010  # Chosen for motors without gears; geared servos have 100 times more.
+    motor_lag: float = 0.020  # A chosen value.
     command_delay: float = 0.0
     joint_noise: float = 0.0
     tension_noise: float = 0.0
@@ -158,7 +157,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
             if given.shape != shape or not (np.isfinite(given) & (given >= least)).all():
                 signs = "" if name == "moment_arms" else " and not below zero"
                 raise FingerError(f"{name} must be of shape {shape}, finite{signs}, got {value!r}.")
-            if shape:  # Tuples compare, and become JSON.
+            if shape:  # Tuples can be compared and encoded as JSON.
                 plain: list[Any] = given.tolist()
                 rows = plain if given.ndim == 1 else map(tuple, plain)
                 msgspec.structs.force_setattr(self, name, tuple(rows))
@@ -167,8 +166,8 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
                 raise FingerError(f"{name} must be above zero, got {numbers[name]}.")
         if not min(self.most_tension) > self.least_tension:
             raise FingerError(
-                f"most_tension must be above least_tension, {self.least_tension} N, which keeps a "
-                "tendon from hanging slack."
+                f"most_tension must be above least_tension, {self.least_tension} N, which keeps "
+                "tendons taut."
             )
 
     @property
@@ -192,7 +191,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         """A copy with some parameters replaced.
 
         Raises:
-            FingerError: See the class.
+            FingerError: If the changed parameters are invalid.
         """
         return msgspec.structs.replace(self, **changes)
 
@@ -215,12 +214,12 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
 
 NOMINAL: Final = FingerParameters()
-"""Finger of the anatomy, with stiff tendons without friction, delay and noise."""
+"""Finger with the values of `anatomy` and stiff tendons, without friction, delay or noise."""
 
 PARAMETER_SETS: Final[Mapping[str, FingerParameters]] = MappingProxyType(
     {"an-1983": NOMINAL.replace(moment_arms=AN_1983_ARMS)}
 )
-"""Other sets of parameters, keyed by name. No tensions balance the moment arms of "an-1983"; see
+"""Other sets of parameters, keyed by name. Tendons cannot balance the joints with "an-1983"; see
 `anatomy.AN_1983_ARMS`."""
 
 

@@ -1,7 +1,7 @@
 """Paths that a fingertip follows: shapes, functions of time, and recorded tables.
 
-The frame is the finger's: x distal, y radial, z dorsal, in metres from the knuckle (the MCP joint);
-time is in seconds. The env checks whether a finger reaches a path.
+Positions are in the finger's frame: x distal, y radial, z dorsal, in metres from the knuckle (the
+MCP joint). Times are in seconds. The env checks whether a finger reaches a path.
 
 >>> from shapechanger.finger.paths import as_path
 >>> path = as_path({"kind": "circle", "radius": 0.01, "hz": 1.0})
@@ -44,14 +44,14 @@ CLOSED_M: Final = 1e-4
 class FingertipPath:
     """Path that a fingertip follows; create it with the functions of this module.
 
-    A closed path is periodic, also before 0 s. An open path begins at 0 s and ends at `duration_s`;
-    before and after, the point rests at its ends.
+    A closed path is periodic, also before 0 s. An open path begins at 0 s and ends at `duration_s`.
+    Before its beginning and after its end, the point is at rest.
 
     Attributes:
         position: Positions, m, shape (n, 3), at times from 0 to `duration_s`, s, shape (n,).
         duration_s: Period of a closed path, or duration of an open one, s, above 0; infinite for an
             endless function.
-        closed: Whether it is periodic.
+        closed: Whether the path is periodic.
     """
 
     position: Callable[[Array], Array]
@@ -59,10 +59,10 @@ class FingertipPath:
     closed: bool
 
     def at(self, t: ArrayLike) -> Array:
-        """Return the position of the point.
+        """Return the positions of the point at times.
 
         Args:
-            t: Array, s, finite, of any shape and sign.
+            t: Times, s, finite, of any shape and sign.
 
         Returns:
             Positions in the finger's frame, m, shape (..., 3).
@@ -79,16 +79,16 @@ class FingertipPath:
 
 
 FASTEST_MPS: Final = 2.0
-"""Speed limit of paths, m/s, 20 rad/s at 0.1 m; a faster one is a jump, or has wrong units."""
+"""Speed limit of paths, m/s: 20 rad/s at 0.1 m. A faster path has a jump or wrong units."""
 
 
 def _require_slow(where: str, first: Array, last: Array, seconds: float) -> None:
-    """Refuse a jump between two points."""
+    """Raise a PathError if two points are farther apart than `FASTEST_MPS` allows."""
     distance = math.dist(first, last)
     if distance > FASTEST_MPS * seconds:
         raise PathError(
-            f"{where}: the point moves {distance:.3g} m in {seconds:.3g} s, and no fingertip is "
-            f"faster than {FASTEST_MPS:g} m/s; t must be in s, and x, y, z in m."
+            f"{where}: the point moves {distance:.3g} m in {seconds:.3g} s, but must not be "
+            f"faster than {FASTEST_MPS:g} m/s. Times must be in s, and x, y, z in m."
         )
 
 
@@ -133,14 +133,14 @@ def circle(
 ) -> FingertipPath:
     """Return a circle at constant speed.
 
-    It begins on its distal side (on its dorsal side if `normal` points along x) and turns around
-    `normal` by the right-hand rule: by default towards the palm first.
+    The path begins on its distal side, or on its dorsal side if `normal` points along x. It turns
+    around `normal` by the right-hand rule, so by default it first moves towards the palm.
 
     Args:
-        radius: m, above 0.
-        centre: m, in the frame of the finger.
+        radius: Radius, m, above 0.
+        centre: Centre in the finger's frame, m.
         hz: Turns per second, above 0.
-        normal: Normal of its plane, of any length except 0.
+        normal: Normal of the circle's plane, of any length except 0.
         phase: Phase at 0 s, rad.
 
     Raises:
@@ -159,20 +159,20 @@ def figure_eight(
     phase: float = 0.0,
     depth: float = 0.0,
 ) -> FingertipPath:
-    """Return a horizontal figure eight: the lemniscate of Gerono, which may leave its plane.
+    """Return a horizontal figure eight: a lemniscate of Gerono, flat or bent.
 
-    It begins at its crossing, towards its distal loop. Seen against `normal`, it runs clockwise
-    around the distal loop and counter-clockwise around the other.
+    The path begins at its crossing, towards the distal loop. Seen against `normal`, it runs
+    clockwise around the distal loop and counter-clockwise around the other loop.
 
     Args:
-        size: Its length along x, or as near to x as its plane allows, m, above 0; it is half as
-            wide.
-        centre: Its middle, m, in the finger's frame.
+        size: Length along x, or along the direction of the plane nearest to x, m, above 0. The
+            width is half the length.
+        centre: Centre in the finger's frame, m.
         hz: Periods per second, above 0; one period covers both loops.
-        normal: Normal of its plane, of any length except 0.
+        normal: Normal of the plane, of any length except 0.
         phase: Phase at 0 s, rad.
-        depth: Its extent along `normal`, m: both loops are bent by half of it towards `normal`,
-            and the crossing away. By default it is flat.
+        depth: Extent along `normal`, m: both loops are bent by half of `depth` towards `normal`,
+            and the crossing by half of `depth` away; 0 for a flat path.
 
     Raises:
         PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
@@ -192,8 +192,8 @@ def line(
     """Return a straight line, traversed back and forth in harmonic motion.
 
     Args:
-        start: First end, m, in the frame of the finger.
-        end: Other end, m; elsewhere than `start`.
+        start: First end in the finger's frame, m.
+        end: Other end, m, different from `start`.
         hz: Periods per second, above 0; one period covers both directions.
 
     Raises:
@@ -202,13 +202,13 @@ def line(
     first = np.array(_vector("The start of a line", start))
     last = np.array(_vector("The end of a line", end))
     if np.array_equal(first, last):
-        raise PathError(f"A line must end elsewhere than it starts, got {start!r} twice.")
+        raise PathError(f"The ends of a line must differ, got {start!r} twice.")
     middle = first / 2.0 + last / 2.0
     return _closed("line", hz, 0.0, tuple(middle), [first - middle], [np.zeros(3)])
 
 
 def _number(name: str, value: Any, above: float = -math.inf) -> float:
-    """Return a finite number; raise PathError, with its name, for anything else."""
+    """Return a finite number, or raise a PathError that begins with `name`."""
     found = float(value) if isinstance(value, Real) else math.nan
     if isinstance(value, bool) or not above < found < math.inf:
         beyond = " above 0" if above == 0.0 else ""
@@ -217,7 +217,7 @@ def _number(name: str, value: Any, above: float = -math.inf) -> float:
 
 
 def _vector(name: str, value: Any) -> Array:
-    """Return three finite numbers; raise PathError, with their name, for anything else."""
+    """Return three finite numbers, or raise a PathError that begins with `name`."""
     numbers = as_numbers(value)
     if numbers.shape != (3,) or not np.isfinite(numbers).all():
         raise PathError(f"{name} must be three finite numbers (x, y, z), got {value!r}.")
@@ -225,11 +225,11 @@ def _vector(name: str, value: Any) -> Array:
 
 
 def _axes(normal: Vector) -> list[Array]:
-    """Return unit vectors along, across and out of a plane: right-handed, the first close to x."""
+    """Return unit vectors along a plane, close to x, across it and out of it: right-handed."""
     out = _vector("The normal of a plane", normal).copy()
     if not out.any():
         raise PathError("The normal of a plane must not be (0, 0, 0): it has no direction.")
-    out /= np.abs(out).max()  # First, because the square of a small number may be 0.
+    out /= np.abs(out).max()  # Without this, the squares of small numbers may be 0.
     out /= np.linalg.norm(out)
     along = np.eye(3)[0] - out[0] * out
     if np.linalg.norm(along) < 1e-6:
@@ -259,13 +259,13 @@ def _closed(
         fastest = np.hypot(np.hypot(around[:, 0], around[:, 1]), around[:, 2]).max()
     if not fastest <= FASTEST_MPS:
         raise PathError(
-            f"This {kind} is as fast as {fastest:.3g} m/s, and no fingertip is faster than "
-            f"{FASTEST_MPS:g} m/s: make it smaller, or hz lower."
+            f"A {kind} must not be faster than {FASTEST_MPS:g} m/s, got {fastest:.3g} m/s: make "
+            "it smaller, or hz lower."
         )
     return path
 
 
-# Time in which a function is checked, s, and the number of steps in it.
+# Duration for which a function is checked, s, and the number of steps in this time.
 _TRIAL_S: Final = 10.0
 _TRIALS: Final = 5000
 
@@ -278,8 +278,8 @@ def from_callable(function: Callable[[float], ArrayLike]) -> FingertipPath:
             deterministic. Its first 10 s are checked at 500 points per second.
 
     Raises:
-        PathError: If the function does not return three finite numbers, or jumps or is faster than
-            `FASTEST_MPS` from one of these points to the next.
+        PathError: If the function does not return three finite numbers, or moves faster than
+            `FASTEST_MPS` from one checked point to the next.
     """
     path = FingertipPath(partial(_points, function), math.inf, closed=False)
     times = np.linspace(0.0, _TRIAL_S, _TRIALS + 1)
@@ -291,14 +291,14 @@ def from_callable(function: Callable[[float], ArrayLike]) -> FingertipPath:
 
 
 def _points(function: Callable[[float], ArrayLike], t: Array) -> Array:
-    """Return the positions of a function of one time."""
+    """Return the positions, m, (n, 3), that a function gives for times, s, (n,)."""
     found: list[Array] = []
     for now in t.tolist():
         given = function(now)
         point = as_numbers(given)
         if point.shape != (3,) or not np.isfinite(point).all():
             raise PathError(
-                "The function of a path must return three finite numbers (x, y, z) in m, and at "
+                "The function of a path must return three finite numbers (x, y, z) in m, but at "
                 f"{now:.6g} s it returned {given!r}."
             )
         found.append(point)
@@ -310,9 +310,9 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
 
     The first line names the columns `t`, `x`, `y` and `z`, in any order: time in s, position in the
     finger's frame in m. Time steps may vary. A cubic spline connects the rows, with continuous
-    velocity and acceleration. Time counts from the first row. A path that ends within 0.1 mm of its
-    beginning is closed: its spline is periodic, and passes through the middle of the first and last
-    point. An open path ends with its last row.
+    velocity and acceleration. Time starts at the first row. A path that ends within 0.1 mm of its
+    beginning is closed: its spline is periodic, and passes through the point midway between the
+    first and the last row. An open path ends with the last row.
 
     Args:
         path: The file, in UTF-8; empty lines are skipped.
@@ -339,9 +339,9 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
     for where, cells in lines[1:]:
         numbers = as_numbers(cells)
         if numbers.shape != (4,) or not np.isfinite(numbers).all():
-            raise PathError(f"{where}: four finite numbers are due, got {','.join(cells)!r}.")
+            raise PathError(f"{where}: a row must be four finite numbers, got {','.join(cells)!r}.")
     if len(lines) < 4:  # A spline of two rows would be a line.
-        raise PathError(f"{name} has too few rows: {len(lines) - 1}, and a path needs 3.")
+        raise PathError(f"{name} must have at least 3 rows, got {len(lines) - 1}.")
     table = np.array([cells for _, cells in lines[1:]], np.float64)
     table = table[:, [header.index(column) for column in "txyz"]]
     times, points = table[:, 0] - table[0, 0], table[:, 1:]
@@ -362,7 +362,7 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
 
 
 PathSource = FingertipPath | str | PurePath | Mapping[str, Any] | Callable[[float], ArrayLike]
-"""A path, the name of a shape, a CSV file, a name with settings, or a function of time."""
+"""A path, the name of a shape, a shape with settings, a CSV file, or a function of time."""
 
 _SHAPES: Final[dict[str, Callable[..., FingertipPath]]] = {
     "circle": circle,
@@ -376,19 +376,19 @@ KINDS: Final = tuple(_SHAPES)
 
 
 def as_path(value: PathSource) -> FingertipPath:
-    """Return a path from any of its sources.
+    """Return the path that a value describes.
 
     Args:
-        value: A path; the name of a shape, one of `KINDS`; a mapping with that name as "kind" and
+        value: A path; the name of a shape, one of `KINDS`; a mapping with such a name as "kind" and
             with arguments of the function that makes the shape, such as
-            `{"kind": "circle", "radius": 0.01, "hz": 1.0}`; the name of a file that ends in .csv,
-            as `from_csv` reads it; or a function for `from_callable`, endless.
+            `{"kind": "circle", "radius": 0.01, "hz": 1.0}`; the name of a .csv file for `from_csv`;
+            or a function for `from_callable`, which makes an endless path.
 
     Raises:
-        UnknownName: If there is no such shape, or it has no such setting.
-        PathError: If it is not one of these, or the path is invalid.
+        UnknownName: If the name of the shape or of a setting is unknown.
+        PathError: If the value has another type, or the path is invalid.
     """
-    given: Any = value  # May be anything where nothing checks types.
+    given: Any = value
     if isinstance(given, FingertipPath):
         return given
     if isinstance(given, (str, PurePath)) and str(given).lower().endswith(".csv"):

@@ -1,7 +1,4 @@
-"""The simulated finger: takes commands and returns measurements.
-
-On a rig's command path, tensions are computed at a rate, held, and sent with a limited slew.
-"""
+"""Simulation of a finger with its sensors, with or without the command path of a rig."""
 
 from __future__ import annotations
 
@@ -33,7 +30,7 @@ class JointVelocities:
         self._velocities = np.zeros(0)
 
     def forget(self) -> None:
-        """Start over: the next measurement is at rest."""
+        """Forget all measurements; after the next one, velocities are 0."""
         self._angles = None
 
     def of(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -59,15 +56,15 @@ _N_TENDONS: Final = len(TENDONS)
 class FingerPlant:
     """MuJoCo simulation of a finger with its drive and its sensors.
 
-    A command of the drive lasts `CONTROL_DT`. `held` simulates the path of the commands; it is None
-    without one.
+    A command of the drive lasts `CONTROL_DT`. `held` simulates the command path, or is None if the
+    parameters have no path.
     """
 
     def __init__(self, parameters: FingerParameters, drive: TendonDrive) -> None:
         self.parameters = parameters
         self.model: mujoco.MjModel = build_finger(parameters, drive).compile()
         self.data = mujoco.MjData(self.model)
-        # A view, because reading the warnings one by one takes longer than a step.
+        # This array is a view, because reading the warnings one by one takes longer than a step.
         self._warnings: NDArray[np.int32] = cast("Any", self.data.warning).number
         self._drive = drive
         timestep = self.model.opt.timestep
@@ -82,7 +79,7 @@ class FingerPlant:
 
     @property
     def fingertip(self) -> NDArray[np.float64]:
-        """True place of the fingertip, m, (3,)."""
+        """True position of the fingertip, m, (3,)."""
         return self._tip.copy()
 
     @property
@@ -92,7 +89,7 @@ class FingerPlant:
 
     @property
     def diverged(self) -> bool:
-        """Return whether MuJoCo has found the state huge or not finite since the last `place`."""
+        """Return whether the state was huge or not finite at any time since the last `place`."""
         return bool(self._warnings.any())
 
     def mark(self, place: NDArray[np.float64]) -> None:
@@ -158,10 +155,11 @@ _WHOLE: Final = 1e-6
 
 
 class HeldTensions:
-    """Simulates a finger whose commands take a path, instead of a drive in each simulation step.
+    """Simulates a finger with a command path.
 
-    A command lasts `control_dt`, s, with `computations` of tensions; each is sent in `ticks` ticks
-    of `steps` simulation steps, each `timestep`, s, long.
+    During a command, which lasts `control_dt` seconds, tensions are computed `computations` times.
+    After each computation they are sent in `ticks` ticks with a limited slew. A tick lasts `steps`
+    simulation steps of `timestep` seconds.
 
     Raises:
         FingerError: If a command does not last a whole number of computations, or a tick a whole
@@ -225,7 +223,7 @@ class HeldTensions:
 def hold_controls(
     model: mujoco.MjModel, data: mujoco.MjData, controls: NDArray[np.float64]
 ) -> None:
-    """Set controls, -1 to 1, (7,), that have acted for long, and act until delayed ones arrive."""
+    """Set controls, -1 to 1, (7,), as if they had acted long enough to fill delays and lags."""
     data.ctrl[:] = controls
     data.act[:] = controls
     for i, held in enumerate(controls):
@@ -235,7 +233,7 @@ def hold_controls(
 
 
 def slewed(now: Any, aim: Any, rise: Any, fall: Any) -> Any:
-    """Return the next tick's shares of the ranges, as `contract.limits.slewed`; or tensors."""
+    """Move arrays or tensors towards `aim` by at most `rise` up and `fall` down."""
     return aim.clip(now - fall, now + rise)
 
 

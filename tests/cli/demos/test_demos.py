@@ -176,7 +176,7 @@ def test_an_env_with_other_actions_is_refused(data: Path, demos: Cli) -> None:
     first, _ = episodes(data)
     sentence = demos.refused("replay", first, "--env", "Ant")
     assert "hip_1/motor" in sentence
-    assert "was recorded with steering, throttle" in sentence
+    assert "has steering, throttle" in sentence
 
 
 SHORT = ("--minutes", "0.05", "--episode-s", "2", "--options", '{"size": [64, 48]}')

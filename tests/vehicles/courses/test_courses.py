@@ -136,7 +136,7 @@ def test_yards_and_harbours_have_every_kind() -> None:
 def test_impossible_courses_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
         lay_out("harbor", 0)
-    with pytest.raises(WorldError, match="from 0, got -1"):
+    with pytest.raises(WorldError, match="at least 0, got -1"):
         lay_out("yard", -1)
     monkeypatch.setattr("shapechanger.vehicles.courses.open_course", lambda *_: None)
     with pytest.raises(WorldError, match="No yard with seed 3"):

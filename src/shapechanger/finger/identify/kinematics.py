@@ -1,15 +1,15 @@
 """Moment arms and tendon stretch, from a regression of lengths on angles and tensions.
 
-A motor winds up the tendon that the joints release, and the tendon's stretch:
+The length that a motor has wound up depends on the joint angles and on the tendon's stretch:
 
     length = zero - arms · angles - (tension + friction + damping) / stiffness.
 
 Angles are noisy and lengths nearly exact, so a plain regression of lengths on angles would
-underestimate the arms. Here the errors of both are weighted, at each time, by their covariance:
-errors of angles pass through the arms themselves, `V = R S R' + D`, and the estimated arms maximize
-the likelihood (the structural relation of Fuller 1987, "Measurement error models", section 2.3).
-The search starts from a regression on the part of the angles that the other tendons' lengths
-explain (instrumental variables).
+underestimate the arms. Here residuals are weighted, at each time, by their covariance
+`V = R S R' + D` with the moment arms R, the variances S of the angles and D of the lengths. The
+estimated arms maximize the likelihood (the structural relation of Fuller 1987, "Measurement error
+models", section 2.3). The search starts from a regression on the part of the angles that the other
+tendons' lengths explain (instrumental variables).
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from shapechanger.finger.anatomy import MOMENT_ARMS, TENDONS
 from shapechanger.finger.identify.log import FingerLog
 
 ARMS: Final[NDArray[np.bool_]] = MOMENT_ARMS != 0.0
-"""Mask of the tendons that pass each joint, (7, 4)."""
+"""Mask of the tendons that cross each joint, (7, 4)."""
 
 _N_ARMS: Final = int(ARMS.sum())
 _N_TENDONS: Final = len(TENDONS)
 # Time over which errors of friction and of velocities are correlated, s.
 _MEMORY_S: Final = 0.5
-# Speed at which friction has changed its sign, m/s; tendons move at 10 to 100 mm/s.
+# Scale of the speed over which friction changes its sign, m/s; tendons move at 10 to 100 mm/s.
 _SLIDES_AT: Final = 0.020
-# Start of the log that is left out, s: the finger still moves from its initial pose.
+# Time at the start of the log that is ignored, s, while the finger leaves its initial pose.
 _SETTLES_S: Final = 0.2
 # Iterations of reweighting.
 _ROUNDS: Final = 4
-# Smallest noise that can be told from rounding, rad and m.
+# Smallest noise that can be distinguished from rounding, rad and m.
 _LEAST_NOISE: Final = 1e-6
-# Beyond this many standard deviations a length belongs to a slack tendon; its variance is
-# multiplied.
+# A residual beyond this many standard deviations indicates a slack tendon; the variance is then
+# multiplied by the second number.
 _OUTLIER: Final = 5.0
 _OUTLIER_VARIANCE: Final = 1e4
-# Scales of the solver's parameters: mm of arms and zeros; 0.1 mm/N of compliance; 0.1 mm of
-# friction over stiffness; 1 ms of damping over stiffness.
+# Units of the solver's parameters: 1 mm for arms and zeros, 0.1 mm/N for compliance, 0.1 mm for
+# friction divided by stiffness, and 1 ms for damping divided by stiffness.
 _UNITS: Final = np.array([1e-3] * (_N_ARMS + _N_TENDONS) + [1e-4, 1e-4, 1e-3])
 
 
@@ -55,7 +55,7 @@ class Kinematics:
 
     Attributes:
         arms: Moment arms, m, (7, 4).
-        arms_sd: Standard errors of the arms, m, (7, 4); 0 where a tendon passes no joint.
+        arms_sd: Standard errors of the arms, m, (7, 4); 0 if a tendon does not cross a joint.
         compliance: Stretch per newton, m/N; near 0 for stiff tendons.
         compliance_sd: Standard error of `compliance`, m/N.
         joint_noise: Standard deviation of measured angles, rad, (4,).
@@ -88,8 +88,7 @@ def fit_kinematics(log: FingerLog) -> Kinematics:
     times = len(settled.lengths)
     jacobian = np.asarray(solved.jac).reshape(times, _N_TENDONS, -1)
     spread = robust_covariance(jacobian, np.asarray(solved.fun).reshape(times, -1), log.control_dt)
-    # The residuals' own covariance is uncertain, so no interval is narrower than noise alone
-    # makes it.
+    # The estimated covariance is uncertain, so intervals are at least as wide as for noise alone.
     bread = np.asarray(np.linalg.pinv(solved.jac.T @ solved.jac, hermitian=True), np.float64)
     by_noise = np.sqrt(np.diag(bread))
     wider = np.maximum(1.0, by_noise / np.sqrt(np.diag(spread)))
@@ -110,8 +109,8 @@ def robust_covariance(
 ) -> NDArray[np.float64]:
     """Sandwich estimate of a least-squares fit's covariance, (p, p), with correlated residuals.
 
-    Residuals at the optimum, (times, k), with their Jacobian, (times, k, p), may be correlated with
-    others within half a second; the weights follow Newey & West 1987 (Econometrica 55:703).
+    Residuals at the optimum, (times, k), with the Jacobian (times, k, p), may be correlated within
+    half a second; the weights follow Newey & West 1987 (Econometrica 55:703).
     """
     squares = np.einsum("tip,tiq->pq", jacobian, jacobian)
     bread = np.asarray(np.linalg.pinv(squares, hermitian=True), np.float64)
@@ -127,9 +126,9 @@ def robust_covariance(
 def interval_quantile(times: int, control_dt: float) -> float:
     """Half width of a 95 % interval, in standard errors of `robust_covariance`.
 
-    It is above 1.96, because the covariance is itself estimated from few stretches of half a
-    second: the cubic of Kiefer & Vogelsang 2005 (Econometric Theory 21:1130, table 1, Bartlett's
-    weights).
+    The quantile is above 1.96, because the covariance is estimated from few periods of half a
+    second. It is the cubic of Kiefer & Vogelsang 2005 (Econometric Theory 21:1130, table 1,
+    Bartlett's weights).
     """
     b = min(1.0, _lags(control_dt) / times)
     return float(np.polyval([-0.5324, 0.4160, 2.9694, 1.9600], b))
@@ -137,9 +136,10 @@ def interval_quantile(times: int, control_dt: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Regression:
-    """Columns of the regression, one row per time: those of a log, and two of their rates.
+    """Columns of the regression, one row per time.
 
-    `speeds` are rates of the lengths, m/s, (n, 7), and `directions` their smoothed signs, -1 to 1.
+    `speeds` are rates of the lengths, m/s, (n, 7). `directions` are smoothed signs of the speeds,
+    -1 to 1, (n, 7).
     """
 
     lengths: NDArray[np.float64]
@@ -183,7 +183,7 @@ class _Regression:
         return x
 
     def residuals(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Measured lengths minus the model's at the measured angles, m, (n, 7)."""
+        """Measured lengths minus lengths by the model at the measured angles, m, (n, 7)."""
         zeros = x[_N_ARMS : _N_ARMS + _N_TENDONS] * 1e-3
         compliance, friction, damping = x[-3:] * _UNITS[-3:]
         stretch = compliance * self.tensions + friction * self.directions + damping * self.speeds
@@ -199,7 +199,7 @@ class _Regression:
     ) -> NDArray[np.float64]:
         """Variance of each length, m², (n, 7).
 
-        It is large while friction changes its sign, and where a tendon hung slack.
+        The variance is large while friction changes its sign, and while a tendon is slack.
         """
         friction = x[-2] * _UNITS[-2]
         plain = length_noise**2 + 0.5 * friction**2 * (1.0 - self.directions**2)
@@ -224,7 +224,7 @@ def _whitened(
     noise: NDArray[np.float64],
     variance: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the residuals over their standard deviations, uncorrelated, (n * 7,)."""
+    """Return residuals that are uncorrelated and have a variance of 1, (n * 7,)."""
     factor = np.linalg.cholesky(_total(x, noise, variance))
     whitened: Any = np.linalg.solve(factor, data.residuals(x)[..., None])
     return np.asarray(whitened[..., 0].ravel(), np.float64)
@@ -239,7 +239,7 @@ def _arms(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _placed(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a value of each arm at its place, (7, 4)."""
+    """Return a matrix, (7, 4), with the values at the elements where `ARMS` is true."""
     placed = np.zeros(ARMS.shape)
     placed[ARMS] = values
     return placed

@@ -35,13 +35,13 @@ SIGNALS: Final = {
 """Arrays of a log and the shapes of their rows."""
 _SETTINGS: Final = ("actions", "control_dt", "source", "motors")
 
-# Longest step between two rows, in control periods. Clocks jitter; a missing row is a gap.
+# Longest time between two rows, in control periods. It allows jitter, but no missing row.
 _LONGEST_STEP: Final = 1.5
 _MAX_BYTES: Final = 256 << 20  # An hour at 50 Hz has about 30 MB.
-# Shortest log, s. The intervals rest on how errors repeat within half a second.
+# Shortest log, s. The intervals need several periods of half a second.
 _SHORTEST_S: Final = 4.0
-# Smallest range of each joint, rad, from the 5th to the 95th percentile. An arm of 9 mm winds
-# 1.5 mm over it.
+# Smallest range of each joint, rad, from the 5th to the 95th percentile. Over this range, a tendon
+# with an arm of 9 mm moves 1.5 mm.
 _LEAST_RANGE: Final = math.radians(10.0)
 # Smallest standard deviation, rad, of the part of a joint's motion that the other joints do not
 # explain.
@@ -57,16 +57,16 @@ class FingerLog:
         commands: Commands that acted in the period ending at `t`, -1 to 1, (n, 7).
         angles: Joint angles, rad, (n, 4); flexion and radial abduction are positive.
         tensions: Tendon tensions, N, (n, 7).
-        lengths: Tendon lengths that their motors wound, m, (n, 7); winding up shortens them.
+        lengths: Lengths of the tendons at the motors, m, (n, 7); winding up shortens them.
         actions: Meaning of a command; see `shapechanger.finger.tensions.DRIVES`.
         control_dt: Control period, s.
         source: Recorded env or robot, such as an env id.
-        motors: A finger with the motors, the range of tensions and the command path of the rig;
-            None if they are unknown. A log hardly identifies geared motors.
+        motors: A finger with the rig's motors, tension range and command path, because a log
+            hardly identifies geared motors; None if they are unknown.
 
     Raises:
-        FingerError: If the arrays differ in length, hold a number that is not finite, run backwards
-            in time or have gaps.
+        FingerError: If the arrays differ in length or contain a number that is not finite, or the
+            times do not increase or have gaps.
         UnknownName: If `actions` is not a known mode.
     """
 
@@ -115,7 +115,7 @@ def require_informative(log: FingerLog) -> None:
     """Check that every joint moves far enough and independently of the others.
 
     Raises:
-        FingerError: If the log is too short, or a joint hardly moves or only along with others.
+        FingerError: If the log is too short, or a joint hardly moves or moves only with others.
     """
     if log.seconds < _SHORTEST_S - 0.5 * log.control_dt:
         raise FingerError(
@@ -159,7 +159,7 @@ def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
 
     Args:
         log: The log.
-        path: File to write, as it is: no ending is added.
+        path: File to write; no suffix is added.
 
     Raises:
         OutputError: If the file cannot be written.
@@ -171,7 +171,7 @@ def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
     arrays = {name: getattr(log, name) for name in SIGNALS}
     encoded = np.frombuffer(msgspec.json.encode(header), np.uint8)
     try:
-        with Path(path).open("wb") as file:  # NumPy adds an ending to a path.
+        with Path(path).open("wb") as file:  # NumPy would add a suffix to a path.
             np.savez_compressed(file, header=encoded, **arrays)
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}.") from error
@@ -181,9 +181,9 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
     """Read a log written by `save_log`.
 
     Raises:
-        FingerError: If the file is not a log, is damaged, has a later version, or holds a log that
-            `FingerLog` rejects.
-        UnknownName: If its mode of action is unknown.
+        FingerError: If the file is not a log, is damaged or has a later version, or if `FingerLog`
+            rejects the log.
+        UnknownName: If the mode of action of the log is unknown.
     """
     place = Path(path)
     try:
@@ -197,7 +197,7 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
         arrays = {key: np.asarray(loaded[key], np.float64) for key in SIGNALS}
         if (header.joints, header.tendons) != (JOINTS, TENDONS):
             given = ", ".join((*header.joints, *header.tendons)) or "none"
-            raise ValueError(f"its joints and tendons are {given}, and not a finger's")
+            raise ValueError(f"its joints and tendons are {given}, which are not the finger's")
     except OSError as error:
         raise FingerError(f"{path} cannot be read: {error.strerror or error}.") from error
     except (
@@ -217,15 +217,15 @@ def record_babble(
     """Record a log of a finger that `FingerBabble` moves.
 
     Args:
-        env: Any env with the layout of a finger, simulated or on a bench, without a time limit.
+        env: Env with the layout of a finger, simulated or on a rig, without a time limit.
         seconds: Duration, s.
         seed: Seed of the motions and of the env.
         actions: Meaning of an action of the env.
 
     Raises:
         LayoutError: If the env publishes no layouts.
-        UnknownName: If its layout is not a finger's.
-        FingerError: If its observations are not a vector, or it ends too early.
+        UnknownName: If the env's layout is not a finger's.
+        FingerError: If the env's observations are not a vector, or the episode ends too early.
     """
     if not isinstance(env.observation_space, gym.spaces.Box):
         raise FingerError("Recording a finger needs Box observations: omit `goal`.")

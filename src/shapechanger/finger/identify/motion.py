@@ -1,9 +1,9 @@
-"""Motors, from the tensions that follow commands; joints and friction, from simulated motion.
+"""Motor parameters, from commands and tensions; joint and friction parameters, from motion.
 
-Lag, delay and strength of the motors are fitted first. Then `mujoco.sysid` gives the simulated
-finger the log's commands, one second at a time, and changes its parameters until it reaches the
-measured angles. Its tendons do not stretch, which allows a longer time step: its motors act on the
-joints directly, with the lag and delay found from the tensions.
+Lag, delay and strength of the motors are fitted first. Then `mujoco.sysid` simulates the finger
+under the log's commands, one second at a time, and fits parameters until the simulated angles match
+the measured ones. The simulated tendons do not stretch, which allows a longer time step. The
+simulated motors have the fitted lag and delay.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.tensions import drive_of
 
 FINE_S: Final = 0.001
-"""Step at which motors are simulated on their own, s."""
+"""Time step of the simulation of motors alone, s."""
 
-# Start of the log that is left out, s: motors still follow commands from before it.
+# Time at the start of the log that is ignored, s, while commands from before the log still act.
 _FORGETS_S: Final = 0.3
 # Bounds of the parameters.
 _LONGEST_DELAY_S: Final = 0.15
@@ -43,14 +43,14 @@ _STRENGTHS: Final = (0.3, 2.0)
 # Delays to start from: the cost has local minima one control period apart.
 _INITIAL_DELAYS_S: Final = (0.005, 0.03, 0.06, 0.1)
 _LEAST_NOISE_N: Final = 1e-4
-# Relative step of finite differences; clipping gives the residual corners.
+# Relative step of finite differences, large because clipping makes the residual not smooth.
 _MOTOR_STEP: Final = 1e-3
 # Share of the rows with a saturated tendon from which the strength can be estimated.
 _SATURATED: Final = 0.01
 
 
 class CommandSignal:
-    """The commands of a log as functions of time; the first is taken to have acted before it."""
+    """The commands of a log as functions of time; the first command also acts before the log."""
 
     def __init__(self, log: FingerLog) -> None:
         self._t = np.concatenate([[log.t[0] - 1.0], log.t])
@@ -73,7 +73,7 @@ class CommandSignal:
     ) -> NDArray[np.float64]:
         """Activations of the motors at the end of each time step, -1 to 1, (steps, 7).
 
-        They follow the commands with a first-order lag, s, and are at their command at the start.
+        Activations follow commands with a first-order lag, s, and begin at the first command.
         """
         given = self.delayed(start, dt, steps, delay)
         keeps = np.exp(-dt / lag)
@@ -91,7 +91,7 @@ class Motors:
         delay: Delay of the commands, s.
         strength: Largest tensions, divided by the largest tensions of the finger assumed in the
             fit.
-        sd: Standard errors of these three.
+        sd: Standard errors of `lag`, `delay` and `strength`.
         saturates: Whether a tendon reached its largest tension, so that `strength` is an estimate.
         tension_noise: Standard deviation of measured tensions, N.
     """
@@ -116,7 +116,7 @@ def fit_motors(log: FingerLog) -> Motors:
     rows = log.t >= log.t[0] + _FORGETS_S
 
     def demanded(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Tensions before they are clipped to their range, N."""
+        """Tensions, N, before clipping to their range."""
         activations = commands.activations(float(log.t[0]), FINE_S, steps, x[1], x[0])
         at_rows = np.empty(log.commands.shape)
         for i, column in enumerate(activations.T):
@@ -156,33 +156,33 @@ def fit_motors(log: FingerLog) -> Motors:
 
 
 MOTOR_KG: Final = 0.02
-"""Assumed mass of a motor at the tendon, kg, between a bare spool and a motor with gears. Chosen:
-fitted values were two to eight times too large, because they absorb the stretch."""
+"""Assumed mass of a motor at the tendon, kg, between a bare spool and a motor with gears. The mass
+is not fitted: because of the stretch, fitted values were two to eight times too large."""
 
 _N: Final = len(JOINTS)
 FACTORS: Final[Mapping[str, float]] = {
     **{f"joint_stiffness/{j}": v for j, v in zip(JOINTS, NOMINAL.joint_stiffness, strict=True)},
     **{f"joint_damping/{j}": v for j, v in zip(JOINTS, NOMINAL.joint_damping, strict=True)},
-    # N. The nominal finger has no friction, but the fit needs a logarithm. Chosen.
+    # N, chosen: the nominal friction is 0, which has no logarithm.
     "tendon_friction": 0.5,
 }
-"""Fitted parameters and their initial values, in SI units. The fit changes the logarithms of
-factors over these values, so that no parameter can change its sign."""
+"""Fitted parameters and their initial values, in SI units. The fit changes the logarithm of each
+parameter divided by its initial value, so that no parameter can change its sign."""
 
 # Length of a window, s: longer than a joint takes to come to rest, and short enough that errors of
-# its start and of the model do not add up.
+# the initial state and of the model do not add up.
 _WINDOW_S: Final = 1.0
-# Start of the log that is left out, s: the finger still moves from its initial pose.
+# Time at the start of the log that is ignored, s, while the finger leaves its initial pose.
 _SETTLES_S: Final = 0.3
-# Rows of the third-degree polynomial that velocities are taken from.
+# Number of rows that each third-degree polynomial for velocities is fitted to.
 _ROWS: Final = 7
-# Prior standard deviation of a factor's logarithm; parameters that the motion does not determine
-# stay at their initial values.
+# Prior standard deviation of a factor's logarithm. Because of the prior, parameters that the motion
+# does not determine keep their initial values.
 _PRIOR_SD: Final = math.log(3.0)
 _MAX_LOG_FACTOR: Final = math.log(30.0)
 # Standard deviation of simulated minus measured angles under the best model, rad.
 _ANGLE_SD: Final = math.radians(1.0)
-# Lag of a motor whose tensions are known, s.
+# Lag of a simulated motor whose controls are measured tensions, s.
 _INSTANT_S: Final = 1e-4
 _ITERATIONS: Final = 12
 # Step of finite differences, and the step that ends the search, in logarithms.
@@ -192,13 +192,13 @@ _TOLERANCE: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Part of a log, with the state that it begins in.
+    """Part of a log, and the state at its start.
 
     Attributes:
-        start: Time of its first row, s.
-        angles: Angles at its start and at the end of each of its periods, rad, (m + 1, 4).
-        velocities: Angular velocities at its start, rad/s, (4,).
-        activations: Activations of the motors at its start, -1 to 1, (7,).
+        start: Time of the first row, s.
+        angles: Angles at the start and at the end of each control period, rad, (m + 1, 4).
+        velocities: Angular velocities at the start, rad/s, (4,).
+        activations: Activations of the motors at the start, -1 to 1, (7,).
     """
 
     start: float
@@ -215,7 +215,7 @@ def cut_windows(
     length_s: float = _WINDOW_S,
     first_s: float = _SETTLES_S,
 ) -> list[Window]:
-    """Cut a log into windows that follow one another, each `length_s` long, from `first_s` on.
+    """Cut a log, from `first_s`, s, on, into adjacent windows of `length_s`, s.
 
     The last window ends before the row `last`; None for the end of the log.
     """
@@ -242,12 +242,12 @@ def cut_windows(
 
 
 def steps_per_period(control_dt: float, timestep: float) -> int:
-    """Whole number of simulation steps per control period, s, none longer than `timestep`, s."""
+    """Smallest number of simulation steps per control period, s, that are at most `timestep`, s."""
     return math.ceil(control_dt / timestep - 1e-6)
 
 
 def with_motors(motors: Motors, known: FingerParameters | None) -> FingerParameters:
-    """The nominal finger with the motors of a known finger, or for None with the fitted ones."""
+    """The nominal finger with the motors of a known finger, or with the fitted motors for None."""
     nominal = NOMINAL.replace(motor_lag=motors.lag)
     if known is None:
         most = motors.strength * np.array(NOMINAL.most_tension)
@@ -261,14 +261,14 @@ def fit_dynamics(
 ) -> dict[str, tuple[float, float]]:
     """Fit joint and friction parameters to a log, up to the row `last`, or to its end for None.
 
-    Returns each value, in SI units, and the standard error of its logarithm if the model is right,
-    by the names of `FACTORS`.
+    Returns each value, in SI units, and the standard error of its logarithm, keyed by the names of
+    `FACTORS`. The standard errors assume that the model is right.
 
     Raises:
         MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
     """
-    sysid: Any = importlib.import_module("mujoco.sysid")  # It has no type annotations.
-    # Without its dependencies it can be imported all the same, but is empty.
+    sysid: Any = importlib.import_module("mujoco.sysid")  # The module has no type annotations.
+    # If its dependencies are missing, the module can be imported, but is empty.
     if not hasattr(sysid, "build_residual_fn"):
         raise MissingExtra("mujoco[sysid]", "identify")
     fit = _MotionFit(sysid, log, kinematics, motors, last)
@@ -291,7 +291,7 @@ def fit_dynamics(
 
 
 class _MotionFit:
-    """Residuals of the simulated motion; parameters are logarithms of factors over `FACTORS`."""
+    """Residuals of the simulated motion; parameters are logarithms of values over `FACTORS`."""
 
     def __init__(
         self, sysid: Any, log: FingerLog, kinematics: Kinematics, motors: Motors, last: int | None
@@ -301,7 +301,7 @@ class _MotionFit:
         moved = with_motors(motors, log.motors)
         self._path = None if log.motors is None else log.motors.path
         if self._path is not None:
-            # The measured tensions act, which the path has delayed already.
+            # The controls are measured tensions, which already include the lag of the path.
             moved = moved.replace(path=self._path, motor_lag=_INSTANT_S)
         self._least, most = moved.least_tension, np.array(moved.most_tension)
         self._range = most - self._least
@@ -328,7 +328,7 @@ class _MotionFit:
         return found
 
     def residual(self, x: NDArray[np.float64], parameters: Any, **more: Any) -> Any:
-        """Errors of the angles, window by window, then the prior's, each over its sd."""
+        """Errors of the angles in each window, then of the prior, in standard deviations."""
         errors, predicted, measured = self._residual(x, parameters, **more)
         priors = x / _PRIOR_SD
         return [*errors, priors], predicted, measured
@@ -347,7 +347,7 @@ class _MotionFit:
             row += np.size(part)
         windows = len(parts) - 1
         spread = bread @ filling @ bread * (windows / max(1, windows - 1))
-        # A few windows may agree by chance, so no interval is narrower than noise alone makes it.
+        # A few windows may agree by chance, so intervals are at least as wide as for noise alone.
         wider = np.sqrt(np.maximum(1.0, np.diag(bread) / np.diag(spread)))
         return spread * np.outer(wider, wider)
 
@@ -381,7 +381,7 @@ class _MotionFit:
             begun = window.activations if self._path is None else measured_at(window.start)
             state = (window.angles[0], window.velocities, begun)
             starts.append(self._sysid.create_initial_state(self._model, *state))
-            # One more than there are steps: the last one is not simulated.
+            # The series needs one more control than there are steps.
             steps = (len(window.angles) - 1) * self._skip + 1
             at = window.start + step * np.arange(steps)
             late = None if self._path else commands.delayed(window.start, step, steps, delay)

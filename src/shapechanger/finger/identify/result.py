@@ -1,6 +1,6 @@
-"""Identification of a finger: its parameters with intervals, checked on motion that was not fitted.
+"""Identification of a finger: parameters with intervals, validated on motion that was not fitted.
 
-`identify` runs the three fits of this package, one after the other, and collects the results.
+`identify` runs the three fits of this package and collects the results.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ from shapechanger.finger.tensions import drive_of
 # Share of the log that the motion is fitted to; the rest is for validation.
 _FITTED: Final = 0.8
 _NORMAL: Final = 1.96
-# Standard deviations, in logarithms, of the motion fit's errors that come from the model: measured
-# over twenty fingers of the gap "real-like" (`benchmarks/finger_identify.py`). Their tendons
-# stretch; the fit's do not. The hood hides the stiffness of the end joint, and without a
-# rig's path, stretch hides friction.
+# Standard deviations, in logarithms, of errors of the motion fit that come from its model, measured
+# on twenty fingers of the gap "real-like" (`benchmarks/finger_identify.py`). Tendons stretch in
+# these fingers, but not in the fit's model. The hood hides the stiffness of the end joint. Without
+# a rig's command path, stretch hides friction.
 _MODEL_ERROR: Final = {
     "joint_stiffness": 0.15,
     "joint_stiffness/DIP_flexion": 0.40,
@@ -54,21 +54,21 @@ _MODEL_ERROR: Final = {
     "tendon_friction": 1.15,
 }
 _RIG_FRICTION_ERROR: Final = 0.15
-# The same of the stretch, as a share of it, and of the arms on a rig, m: from play and sticking of
-# the gears.
+# Standard deviations of errors of the stretch, as a share of it, and of moment arms on a rig, m.
+# Backlash and friction of the gears cause the errors.
 _STRETCH_ERROR: Final = 0.02
 RIG_ARM_ERROR_M: Final = 0.04e-3
-# Uncertainty of the time in a period at which a sensor is read, and of the motors' first-order
-# model, s. In simulation, tensions are one or two steps old.
+# Standard deviations of errors of delay and lag, s. The time at which a sensor is read varies,
+# and motors are not exactly first-order. In simulation, tensions are one or two steps old.
 _DELAY_ERROR_S: Final = 0.002
 _LAG_ERROR_S: Final = 0.0005
-# Delays that the motion is replayed with, s apart.
+# Interval between the delays with which the motion is replayed, s.
 _DELAY_STEP_S: Final = 0.0025
 PATH_DELAY_ERROR_S: Final = 0.009
-"""Half the interval of a delay found from motion, s: over twenty fingers with play, errors were
-below 9 ms in nineteen (`benchmarks/finger_identify.py`); on twins, 2.6 to 4.8 ms."""
-# Largest stiffness, N/m, that can be told from infinity: at it all tension there is stretches a
-# tendon by less than 0.1 mm.
+"""Half the 95 % interval of a delay found from motion, s. Errors were below 9 ms for nineteen of
+twenty fingers with backlash (`benchmarks/finger_identify.py`), and 2.6 to 4.8 ms on twins."""
+# Largest stiffness, N/m, that can be distinguished from infinity: at this stiffness, the largest
+# tension stretches a tendon by 0.1 mm.
 _STIFFEST: Final = 2.5e5
 # Standard deviation of angles, rad, below which they count as free of noise.
 _NO_NOISE: Final = 1e-5
@@ -88,7 +88,7 @@ class ParameterEstimate:
     value: float  # Estimate.
     low: float  # Lower end of the interval.
     high: float  # Upper end of the interval.
-    nominal: float  # Value of the nominal finger; infinite for the stiffness of its stiff tendons.
+    nominal: float  # Value of the nominal finger; infinite for `tendon_stiffness`.
 
     @property
     def differs(self) -> bool:
@@ -119,9 +119,9 @@ class IdentifiedFinger:
     """Result of `identify`.
 
     Attributes:
-        parameters: The finger, as `build_finger` and the env's argument `parameters` take it.
+        parameters: The finger, for `build_finger` or the env's argument `parameters`.
         estimates: Identified parameters with intervals, the moment arms first.
-        undetermined: Parameters that the log cannot determine, each with a reason for people.
+        undetermined: Names of parameters that the log cannot determine, each with the reason.
         held_out: Validation on the part of the log that was not fitted.
         source: Source named in the log.
         seconds: Length of the log, s.
@@ -141,7 +141,7 @@ class IdentifiedFinger:
 
     @property
     def arm_intervals(self) -> NDArray[np.float64]:
-        """95 % intervals of the moment arms, m, (7, 4, 2); 0 where a tendon passes no joint."""
+        """95 % intervals of the moment arms, m, (7, 4, 2); 0 if a tendon crosses no joint."""
         ends = np.zeros((len(TENDONS), len(JOINTS), 2))
         for estimate in self.arms:
             _, tendon, joint = estimate.name.split("/")
@@ -155,18 +155,18 @@ def identify(
 ) -> IdentifiedFinger:
     """Estimate the parameters of a finger from a log.
 
-    Arms and stretch follow from the lengths, angles and tensions of the whole log, and the motors
-    from its commands and tensions; joint and friction parameters follow from the motion in its
-    first four fifths, by `mujoco.sysid`. The last fifth is simulated for validation. On the path of
-    a rig, tensions hide a delay shorter than a period; it follows from the motion.
+    Arms and stretch are estimated from the lengths, angles and tensions of the whole log, and
+    motors from its commands and tensions. Joint and friction parameters are fitted to the first
+    four fifths of the motion by `mujoco.sysid`. The last fifth is simulated for validation. On the
+    path of a rig, tensions do not show delays below a period, so the motion determines the delay.
 
     Args:
-        log: A log in which each joint moves through much of its range, under tensions that change;
-            ten seconds work well.
+        log: A log, such as of ten seconds, in which each joint moves through much of its range
+            under varying tensions.
         progress: Called with the name of each step before it starts.
 
     Raises:
-        FingerError: If the log is too short, or a joint hardly moves or only along with others.
+        FingerError: If the log is too short, or a joint hardly moves or moves only with others.
         MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
     """
     require_informative(log)
@@ -203,9 +203,9 @@ def identify(
 
 
 def replay(log: FingerLog, parameters: FingerParameters, window: Window) -> NDArray[np.float64]:
-    """Simulate a finger under the commands of a log, from the state that a window begins in.
+    """Simulate a finger under the commands of a log, from the state at the start of a window.
 
-    Returns angles, rad, (m + 1, 4), of which the first row is the window's.
+    Returns angles, rad, (m + 1, 4); the first row is the first row of the window.
     """
     drive, delay = drive_of(log.actions, NOMINAL), parameters.command_delay
     if parameters.path is None:  # The commands below are delayed already.
@@ -246,14 +246,14 @@ def replay(log: FingerLog, parameters: FingerParameters, window: Window) -> NDAr
 
 
 def _delay(log: FingerLog, parameters: FingerParameters, windows: list[Window]) -> float:
-    """Return the delay of the commands, s, with which the replayed angles are the nearest."""
+    """Return the delay of the commands, s, with the smallest errors of the replayed angles."""
     delays = np.arange(0.0, 1.5 * log.control_dt, _DELAY_STEP_S)
     errors: list[float] = []
     for delay in delays.tolist():
         late = parameters.replace(command_delay=delay)
         errors.append(sum(float(np.sum((replay(log, late, w) - w.angles) ** 2)) for w in windows))
     at = min(max(int(np.argmin(errors)), 1), len(delays) - 2)
-    # The lowest point of the parabola through the three lowest.
+    # Take the minimum of the parabola through the lowest error and its two neighbours.
     before, lowest, after = errors[at - 1 : at + 2]
     bend = before - 2.0 * lowest + after
     shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
@@ -327,7 +327,7 @@ def _parameters(
 
 
 def _undetermined(motors: Motors, known: FingerParameters | None) -> tuple[tuple[str, str], ...]:
-    """Names of the parameters that the log cannot determine, each with a sentence for people."""
+    """Names of the parameters that the log cannot determine, each with the reason."""
     kg = MOTOR_KG if known is None else known.motor_kg
     damping = "nominal" if known is None else f"{known.tendon_damping:g} N·s/m"
     undetermined = {
@@ -352,7 +352,7 @@ def _stiffness(kinematics: Kinematics) -> float | None:
 
 
 def _stiffness_estimate(kinematics: Kinematics, reach: float) -> ParameterEstimate:
-    """Estimate the stiffness; its interval is asymmetric, because the compliance's is not."""
+    """Estimate the stiffness as the inverse of the compliance, so its interval is asymmetric."""
     half = reach * math.hypot(kinematics.compliance_sd, _STRETCH_ERROR * kinematics.compliance)
     most, least = kinematics.compliance + half, kinematics.compliance - half
     low = 1.0 / most if most > 0.0 else math.inf
