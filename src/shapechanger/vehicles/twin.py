@@ -1,4 +1,4 @@
-"""Courses in MuJoCo as places of a robot's twin, and the numbers of robots for simulations."""
+"""Courses as places for a robot's twin, and the part of a profile that simulations need."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ except ModuleNotFoundError as error:
     raise MissingExtra(error.name or "mujoco", "sim") from error
 
 ROOM = "room"
-"""Name of the plain room, which takes any robot, among the worlds."""
+"""Name of the world that is a plain room for any robot."""
 
 
 def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
-    """Read the numbers of a robot that its simulation needs."""
+    """Read the part of a robot's profile that its simulation needs."""
     profile = load_profile(find_profile(robot))
     camera = profile.camera
     return SimulatedRobot(
@@ -51,8 +51,9 @@ def place_of(profile: Profile, world: str = "", lenses: Sequence[str] = ()) -> P
 
     Args:
         profile: Profile of the robot.
-        world: Kind of course; "" for the vehicle's default, or the room without such a vehicle.
-        lenses: Disturbances of the camera.
+        world: Kind of course; "" for the vehicle's default, or for the room if the robot is not
+            one of the vehicles.
+        lenses: Names of camera faults.
     """
     for lens in lenses:
         find_corruption(lens)
@@ -68,7 +69,7 @@ def place_of(profile: Profile, world: str = "", lenses: Sequence[str] = ()) -> P
     if profile.body not in VEHICLES:
         raise ProfileError(
             f"{profile.path}: there is no {profile.body} in MuJoCo, only {', '.join(VEHICLES)}; "
-            f"--world {ROOM} takes any robot."
+            f"--world {ROOM} works for any robot."
         )
     require_fit(profile.body, parts)
     require_element(profile.body, floats=VEHICLES[profile.body].floats, world=world)
@@ -76,7 +77,7 @@ def place_of(profile: Profile, world: str = "", lenses: Sequence[str] = ()) -> P
 
 
 def course_place(world: str, vehicle: str, lenses: Sequence[str] = ()) -> Place:
-    """Return a place that the process of a twin's board opens by `open_course`."""
+    """Return a place that the twin's board process opens with `open_course`."""
     arguments = {"world": world, "vehicle": vehicle, "lenses": list(lenses)}
     return Place(f"{__name__}:{open_course.__name__}", arguments)
 

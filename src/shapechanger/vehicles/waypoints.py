@@ -39,12 +39,12 @@ LEAST_THROTTLE: Final = 0.25
 
 _SLOWEST_MPS: Final = 0.3  # Below this, a measured speed hardly predicts the next turn.
 _AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
-# Of a fit to a drive: largest change of the steering within the lag of the turn, s, the jitter of
-# the steps' times, s, and the least share of the turning that the steering must explain.
+# Numbers for `fit_response`: largest change of the steering within the lag, the lag of the turn, s,
+# the jitter of the steps' times, s, and the least share of the turning that steering must explain.
 _CHANGE, _LAG_S, _JITTER_S, _EXPLAINED = 0.1, 0.1, 0.02, 0.5
 _ROUNDING: Final = 1e-9
-# Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
-# is left out because the vehicle is still changing its motion.
+# Numbers for `measure_response`: seconds of driving, and steps between new random commands. The
+# first half of the steps after a new command is ignored, because the motion is still changing.
 _SECONDS, _HOLD = 5.0, 6
 _MOTION: Final = ("steering/applied", "speed", "yaw_rate")
 
@@ -76,8 +76,8 @@ def measure_response(env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int) ->
 
     Args:
         env: A vehicle with steering and throttle as its action. It is reset.
-        speed_at: Place of the speed, m/s, in the numbers that it observes.
-        yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
+        speed_at: Index of the speed, m/s, in the observed numbers.
+        yaw_rate_at: Index of the rate of turn, rad/s, positive to the left.
     """
     from scipy.optimize import nnls  # Not installed on robots, which do not measure themselves.
 
@@ -86,7 +86,7 @@ def measure_response(env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int) ->
     command = np.zeros(2, np.float32)
     turning: list[tuple[float, float]] = []
     rates: list[float] = []
-    step = -1  # Since the commands began, which a reset interrupts.
+    step = -1  # Number of steps since the last reset.
     for _ in range(round(_SECONDS * env.metadata["render_fps"])):
         step += 1
         if step % _HOLD == 0:
@@ -112,11 +112,11 @@ def fit_response(
     """Fit how a vehicle turns to one or more drives.
 
     The turn lags behind the steering, so steps count only if the steering has not changed for
-    0.1 s. The first steps of an episode, the first after a gap, and steps with an unmeasured value
-    are left out.
+    0.1 s. The first steps of an episode or after a gap, and steps with an unmeasured value, do not
+    count.
 
     Args:
-        steering: Steering that the outputs had, -1 to 1, positive to the right, shape (n,).
+        steering: Applied steering, -1 to 1, positive to the right, shape (n,).
         speed: Speed along the heading, m/s, shape (n,).
         yaw_rate: Rate of turn, rad/s, positive to the left, shape (n,).
         times_s: Time of each step since the start of its episode, s, shape (n,); an episode begins
@@ -135,13 +135,13 @@ def fit_response(
     if not numbers.any() or explained < _EXPLAINED:
         raise StudyError(
             f"In this drive, steering explains {max(0.0, explained):.0%} of how the vehicle turns, "
-            f"and {_EXPLAINED:.0%} are needed: drive curves to both sides."
+            f"but it must explain {_EXPLAINED:.0%}: drive curves to both sides."
         )
     return SteeringResponse(float(numbers[0]), float(numbers[1]))
 
 
 def _is_steady(steering: NDArray[np.floating], times_s: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Return at which steps the steering has not changed for as long as the turn lags behind."""
+    """Return the mask of steps at which steering has not changed for the lag of the turn."""
     passed_s = np.diff(times_s)
     usual_s = float(np.median(passed_s)) if len(passed_s) else 0.0
     jitter_s = min(0.5 * usual_s, _JITTER_S)
@@ -186,8 +186,8 @@ def command(
     Args:
         action: Bearing and speed, each from -1 to 1; values beyond are clipped.
         response: How the vehicle turns.
-        speed: Its speed along the heading, m/s.
-        on_the_spot: Whether it turns by its tracks; full throttle would saturate one of them.
+        speed: Speed along the heading, m/s.
+        on_the_spot: Whether the vehicle has tracks; full throttle would saturate one of them.
 
     Raises:
         SpaceMismatch: If the action is not two finite numbers.
@@ -195,7 +195,7 @@ def command(
     values = np.asarray(action, np.float64)
     if values.shape != (2,) or not np.isfinite(values).all():
         raise SpaceMismatch(
-            f"A waypoint is a bearing and a speed, each from -1 to 1, got {values.tolist()}."
+            f"A waypoint must be two finite numbers, bearing and speed, got {values.tolist()}."
         )
     bearing, share = np.clip(values, -1.0, 1.0).tolist()
     fast = max(speed, _SLOWEST_MPS)
@@ -213,9 +213,9 @@ def _numbers(seen: Any) -> NDArray[np.float32]:
 
 
 class WaypointView(gym.Env[Any, NDArray[np.float32]]):
-    """A vehicle, simulated or on the network, with the camera and the action of all vehicles.
+    """A vehicle, simulated or on the network, with rectified images and waypoints as actions.
 
-    `response` is how it turns; None before it was measured.
+    `response` is the vehicle's response to steering, or None before it was measured.
     """
 
     response: SteeringResponse | None
@@ -233,9 +233,9 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
     ) -> None:
         """Wrap another env, whose actions are steering and throttle.
 
-        `camera` is pitch, vertical field of view, degrees, and size of frames; None if unknown.
-        `sensors` are what it must measure, "speed" first. `error` is raised, with the name of the
-        `robot`, if something is unknown, or the camera sees too little.
+        `camera` is the pitch and vertical field of view, degrees, and the size of frames; None if
+        unknown. `sensors` are the names of required measurements, "speed" first. An `error` with
+        the name of the `robot` is raised if something is unknown or the camera sees too little.
         """
         pitch, fovy, size = camera
         slices = env.observation_layout.slices
@@ -305,8 +305,8 @@ class WaypointLabels(NamedTuple):
     """Waypoints that a driver's commands lead to."""
 
     actions: NDArray[np.float32]  # Bearing and speed, each from -1 to 1, shape (n, 2).
-    # Whether a command determines a waypoint, shape (n,). It does not if the vehicle stands still,
-    # drives backward, or did not measure its speed.
+    # Whether a command determines a waypoint, shape (n,): False if the vehicle stands still, drives
+    # backward, or did not measure its speed.
     usable: NDArray[np.bool_]
     # Whether the bearing is only a lower bound, shape (n,): at full steering, or beyond the widest
     # bearing.
@@ -318,16 +318,16 @@ def waypoints_of(
 ) -> WaypointLabels:
     """Return the waypoints that a driver's commands lead to, the inverse of `command`.
 
-    The steering gives the circle that the vehicle drives, and the waypoint is the point of the
-    circle at the distance `AHEAD_M`. At full steering, and if tracks turn on the spot, the intended
-    bearing may be wider than the waypoint, which is then the narrowest one with the same command.
-    The throttle gives the speed; throttles below a quarter, including brakes, become speeds that
-    `command` turns into a quarter.
+    The steering determines the circle on which the vehicle drives. The waypoint is the point of the
+    circle at the distance `AHEAD_M`. At full steering, or if tracks turn on the spot, the driver
+    may have intended a wider bearing; the waypoint is the narrowest with the same command. The
+    throttle determines the speed. For throttles below `LEAST_THROTTLE`, including brakes, `command`
+    converts the speed to `LEAST_THROTTLE`.
 
     Args:
         commands: Steering and throttle, shape (n, 2); values beyond [-1, 1] are clipped.
         response: How the vehicle turns.
-        speed: Its speed along the heading, m/s, shape (n,); NaN where it was not measured.
+        speed: Speed along the heading, m/s, shape (n,); NaN if it was not measured.
     """
     values = np.clip(np.asarray(commands, np.float64), -1.0, 1.0)
     steering, throttle = values.T
@@ -338,7 +338,7 @@ def waypoints_of(
     bearing = np.arcsin(np.clip(sine, -widest, widest)) / WIDEST_RAD
     moves = np.abs(speed) >= STANDING_MPS
     turns = np.abs(steering) * response.per_second >= STANDING_RADPS
-    # Driving backward, no waypoint is ahead; at rest, one needs throttle, or tracks that turn.
+    # Commands that drive backward have no waypoint. At rest, throttle or turning tracks are needed.
     usable = np.where(
         moves, speed > 0.0, (throttle >= LEAST_THROTTLE) | ((throttle >= 0.0) & turns)
     )
@@ -352,8 +352,8 @@ def waypoints_of(
 class WaypointDemonstrations(NamedTuple):
     """Demonstrations with waypoints as actions.
 
-    `kept` is the mask of the given steps that were converted, shape (n,), `response` how the
-    vehicle that was driven turns, and `notes` are sentences for people to read.
+    `kept` is the mask of the given steps that were converted, shape (n,), `response` the response
+    of the vehicle to steering, and `notes` a summary for people.
     """
 
     data: Dataset
@@ -372,17 +372,17 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
         response: How the vehicle turns; None to fit it to the recorded motion.
 
     Raises:
-        DemosError: If the actions are others, there are no images, the response or the speed is
-            unknown, or no step is left.
+        DemosError: If the actions are not steering and throttle, there are no images, the response
+            or the speed is unknown, or no step determines a waypoint.
     """
     names = data.action_layout.names
     if names != ("steering", "throttle"):
         raise DemosError(
-            f"Waypoints follow from steering and throttle, and these demonstrations have the "
-            f"actions {', '.join(names)}: leave out --waypoints."
+            f"Waypoints need steering and throttle, but these demonstrations have the actions "
+            f"{', '.join(names)}: omit --waypoints."
         )
     if data.pictures is None:
-        raise DemosError("These demonstrations have no images, and waypoints are seen in them.")
+        raise DemosError("These demonstrations have no images, but waypoint training needs images.")
     layout, states = data.state_layout, data.states
     columns: dict[str, NDArray[np.float64]] = {}
     if layout is not None and states is not None:
@@ -393,11 +393,11 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
     speed = columns.get("speed")
     if speed is None and response.per_second > 0.0:
         raise DemosError(
-            "The recording has no speed, on which the waypoint depends in a vehicle that turns "
-            f"{response.per_second:g} rad for each second: record it with a sensor of speed."
+            f"The vehicle turns {response.per_second:g} rad for each second, so waypoints depend "
+            "on its speed, but the recording has no speed: record with a sensor of speed."
         )
     if speed is None:
-        # The circle of wheels does not depend on the speed; with a throttle they roll forward.
+        # With wheels, the circle does not depend on the speed, and throttle above 0 drives forward.
         speed = np.where(data.actions[:, 1] > 0.0, 1.0, np.nan)
     labels = waypoints_of(data.actions, response, speed)
     kept = labels.usable

@@ -152,7 +152,7 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
     with pytest.raises(DemosError, match=r"lacks steering/applied, speed, yaw_rate: give --resp"):
         as_waypoints(data)
     assert as_waypoints(data, SteeringResponse(1.9, 0.0)).kept.sum() == 50
-    with pytest.raises(DemosError, match="has no speed, on which the waypoint depends"):
+    with pytest.raises(DemosError, match="but the recording has no speed"):
         as_waypoints(data, SteeringResponse(0.8, 3.1))
     data = _loaded(_record(tmp_path / "stands", 10))
     with pytest.raises(DemosError, match=r"drive curves to both sides: give --response RAD_PER_M"):

@@ -1,7 +1,6 @@
-"""Certificate of the shift between two vehicles: their properties, and how they drive.
+"""Certificate of the shift between two vehicles: differences of properties and of driving.
 
-Properties prove nothing by themselves, so both vehicles drive the same commands: this also finds a
-lens that distorts nothing, or a size that nothing uses.
+A changed property may have no effect, so both vehicles also drive the same commands.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ _HALF, _THROTTLE, _STEERING = 20, 0.5, -0.5
 
 
 def certify_vehicles(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> str:
-    """Compare two vehicles, wrappers included, and return the certificate of their shift.
+    """Compare two vehicles, including wrappers, and return the certificate of their shift.
 
-    It lists the differences of their properties, and of rollouts with the same commands. Both are
-    reset and stepped, and left in the middle of an episode.
+    The certificate lists differences of properties, and of rollouts with the same commands. Both
+    envs are reset and stepped, and remain in the middle of an episode.
 
     Raises:
-        MorphologyError: If one of them is not a vehicle.
-        EmptyShift: If the rollouts give the same frames, places and rewards.
+        MorphologyError: If one of the envs is not a vehicle.
+        EmptyShift: If the rollouts give the same observations, poses and rewards.
     """
     names = _name(source), _name(target)
     old, new = _facts(source), _facts(target)
@@ -66,7 +65,7 @@ def _answers(
     one: tuple[NDArray[np.float64], ...],
     two: tuple[NDArray[np.float64], ...],
 ) -> list[str]:
-    """Return a sentence on each difference of two rollouts."""
+    """Describe the differences of two rollouts."""
     has_waypoints = hasattr(source.unwrapped, "response")
     aside, forward = ("bearing", "speed") if has_waypoints else ("steering", "throttle")
     moved, turned = list[float](), list[float]()

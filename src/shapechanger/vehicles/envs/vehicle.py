@@ -1,4 +1,4 @@
-"""Car, tank, boat and truck as Gymnasium envs of a camera: with steering, and with waypoints."""
+"""Gymnasium envs of a car, tank, boat and truck with a camera, driven by steering or waypoints."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _REWARDED: Final = ("speed", "stall", "collision")  # Quantities that the reward
 class VehicleEnv(DriveEnv):
     """Drive fast without collisions, with a camera that looks ahead.
 
-    The robot is defined by a profile: its caps, slew, reflexes and sensors act as on the bench, by
-    the guard's own functions. Pins, chips and the link are left out; a robot's twin emulates them,
-    and drives to the same place. `shapechanger/RemoteVehicle-v1` is the same task on hardware, on a
-    twin, or over the link.
+    A profile defines the robot. Its caps, slew, reflexes and sensors act as on hardware, by the
+    functions of the guard. Pins, chips and the link are not simulated here, but a robot's twin
+    emulates them, and drives to the same place. `shapechanger/RemoteVehicle-v1` is the same task on
+    hardware or on a twin.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. It acts for one control period
-    of the profile, 1/20 s.
+    `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. An action lasts one control
+    period of the profile, 1/20 s.
 
     | Num | Action     | Min | Max | Unit |
     | --- | ---------- | --- | --- | ---- |
@@ -52,8 +52,7 @@ class VehicleEnv(DriveEnv):
 
     ## Reward
     `DriveReward`: metres forward, minus collisions and seconds of being stuck, all measured by the
-    robot's own sensors. `info["reward_terms"]` and `info["reward_sources"]` give its terms and
-    where they come from.
+    robot's own sensors. `info["reward_terms"]` has its terms, `info["reward_sources"]` the sensors.
 
     ## Start
     At a random place of a course that the seed draws, looking along it, at rest.
@@ -63,11 +62,11 @@ class VehicleEnv(DriveEnv):
     after 1,000 steps.
 
     ## Info
-    `progress`, metres along the course since the start; `collisions` since the start, of any part
-    of the vehicle, also where no bumper detects them; `pose`, (x, y, heading) in m and rad;
-    `course`, the seed of the course; `standing`, whether it neither moves nor turns; and as
-    `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`, `armed`, `emergency`, `absent`,
-    `reward_terms`, `reward_sources`, `captured_ns`, `decided_ns`.
+    `progress`, metres along the course since the start; `collisions` of any part of the vehicle
+    since the start, even if no bumper detects them; `pose`, (x, y, heading) in m and rad; `course`,
+    the seed of the course; `standing`, whether the vehicle neither moves nor turns. Keys shared
+    with `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`, `armed`, `emergency`,
+    `absent`, `reward_terms`, `reward_sources`, `captured_ns`, `decided_ns`.
 
     ## Versions
     v1: the first.
@@ -77,15 +76,15 @@ class VehicleEnv(DriveEnv):
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the vehicle's
             usual place.
         robot: Path or name of a profile; None for `lab-` followed by the vehicle.
-        steering: Replaces the profile's steering; None to keep it.
-        size: Width and height of frames in pixels; None for the profile's.
+        steering: Steering that replaces the profile's; None for the profile's steering.
+        size: Width and height of frames in pixels; None for the profile's size.
         image: Whether observations include the frame.
         state: Whether observations include the state next to the frame.
         reward: Weights that replace the profile's, keyed by name.
-        courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
-        randomise: Whether `reset` samples light, textures and the camera's pose too.
-        put_back: Whether to put the vehicle back on the lane after a collision, as a person next to
-            it would do. A collision then does not end the episode.
+        courses: Courses that `reset` samples: "training", "held-out" or seeds.
+        randomise: Whether `reset` also samples light, textures and the camera's pose.
+        put_back: Whether to put the vehicle back on the lane after a collision, like a person next
+            to it. A collision then does not end the episode.
         lenses: Impairments of the camera, such as ("night", "dirt"); see
             `shapechanger.vehicles.cameras.camera`.
         render_mode: "rgb_array" for `render` to return the newest frame.
@@ -94,9 +93,9 @@ class VehicleEnv(DriveEnv):
         parts: The parts that the robot's outputs move, such as "wheels" and "steering".
 
     Raises:
-        UnknownName: If there is no such vehicle, world, profile, steering, weight, lens, render
-            mode or kind of courses.
-        ProfileError: If the profile moves other parts than the vehicle has, or has no camera.
+        UnknownName: If the name of a vehicle, world, profile, steering, weight, lens, render mode
+            or kind of courses is unknown.
+        ProfileError: If the profile does not fit the vehicle's parts, or has no camera.
         SpaceMismatch: If the frame size is out of range.
         WorldError: If the vehicle cannot drive in the world.
     """
@@ -147,7 +146,7 @@ class VehicleEnv(DriveEnv):
 
     def _begin(self) -> None:
         self._vehicle = SensedVehicle(self.welcome.plan, self.world)
-        # A robot sends its first observation after one period, too.
+        # As on a robot, the first observation comes after one period.
         self._vehicle.advance(self._period_ns, None)
         self._touched = bool(self._vehicle.quantities.get("collision"))
 
@@ -164,7 +163,7 @@ class VehicleEnv(DriveEnv):
         stalled = None if stall is None else bool(stall)
         terms = self._reward.terms(speed, collided, stalled, self._period_ns / 1e9)
         seen, info = self._observe()
-        # After the observation, as a person would do who has seen the collision.
+        # The vehicle is put back after the observation, which shows the collision.
         if self._puts_back and world.collisions > collisions:
             world.put_back()
         return collided, terms, seen, info
@@ -179,10 +178,10 @@ class VehicleEnv(DriveEnv):
 
         Args:
             act: Policy of `teacher_env`: maps observations, (n, 11), to actions, (n, 2).
-            seed: Seed of its mistakes.
+            seed: Seed of the demonstrator's random disturbances.
 
         Raises:
-            ProfileError: If the robot has another control rate than the teacher.
+            ProfileError: If the control rates of the robot and of the teacher differ.
         """
         from shapechanger.vehicles.envs.demonstrators import Demonstrator, require_rate  # SciPy.
 
@@ -234,14 +233,14 @@ def _response_of(
 class WaypointEnv(WaypointView, DriveEnv):
     """The driving task with a camera and an action that are the same for all vehicles.
 
-    Full left is another circle in each vehicle. A waypoint means the same in all of them, so a
-    policy that learned in one vehicle drives another one as it is: images are warped to one virtual
-    camera (`shapechanger.vehicles.cameras.rectify`), and each vehicle turns waypoints into steering
-    by its own `SteeringResponse`, measured when the env is made.
+    Steering to the full left gives a different circle for each vehicle, but a waypoint means the
+    same for all vehicles. A policy that was trained on one vehicle can therefore drive another.
+    Images are warped to one virtual camera (`shapechanger.vehicles.cameras.rectify`). Each vehicle
+    converts waypoints to steering by its `SteeringResponse`, measured when the env is made.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`: bearing of the free way 0.8 m ahead, where 1 is 1 rad to the right;
-    and the speed, -1 for standing and 1 for full throttle. It acts for one control period, 1/20 s.
+    `Box(-1, 1, (2,), float32)`: the bearing of a point 0.8 m ahead, 1 for 1 rad to the right; and
+    the speed, 1 for full throttle and -1 for the least. An action lasts one control period, 1/20 s.
 
     | Num | Action             | Min | Max | Unit |
     | --- | ------------------ | --- | --- | ---- |
@@ -270,19 +269,18 @@ class WaypointEnv(WaypointView, DriveEnv):
         vehicle: As in `VehicleEnv`, with its errors.
         robot: As in `VehicleEnv`.
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
-            for a boat, so that vehicles differ in their bodies alone.
-        sensed: Whether speed and reward are those that the sensors of `VehicleEnv` measure, instead
-            of the true ones; its physics takes shorter steps, too.
+            for a boat, so that only the bodies of vehicles differ.
+        sensed: Whether the sensors of `VehicleEnv` measure speed and reward, in shorter physics
+            steps; otherwise speed and reward are the true ones.
         **task: `courses`, `randomise`, `put_back`, `lenses` and `render_mode` of `VehicleEnv`.
-            Images are warped as if the camera were in its place, so with `randomise` a policy sees
-            the error of its pose.
+            Warping ignores errors of the camera's pose, so with `randomise` images show them.
 
     Attributes:
         parts: The parts that the robot's outputs move.
         response: How the vehicle turns.
 
     Raises:
-        ProfileError: If the robot has no camera that sees what policies for all vehicles look at.
+        ProfileError: If the robot has no camera that covers the virtual camera's view.
     """
 
     certify_shift = staticmethod(certify_vehicles)

@@ -32,25 +32,25 @@ from shapechanger.vehicles.expert.path import CoursePath, plan_path
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Driving properties of a vehicle, all but the body tuned on training courses.
+    """Driving properties of a vehicle, tuned on training courses.
 
     Attributes:
         body: Model of the vehicle.
         drive: Kind of steering: front wheels, two tracks, or a rudder.
-        margin_m: Smallest clearance on each side of its path: for the corners of its hull, a
-            trailer that cuts corners, and errors.
+        margin_m: Smallest clearance on each side, which the corners of the hull, a trailer that
+            cuts corners, and errors need.
         comfort_m: Preferred clearance.
         cruise: Share of the top speed on free, straight lanes.
         lateral_limit: Largest lateral acceleration, m/s2.
         braking: Reliable deceleration, m/s2.
-        look_m: Look-ahead distance at standstill.
-        look_s: Additional look-ahead distance per speed.
-        turn: Effect of one unit of steering: for wheels the tangent of the full lock over the
-            wheelbase, a curvature, 1/m; for tracks the rate of turn, rad/s; for a rudder the rate
-            of turn over the speed, rad/m.
-        dead: Dead band of a tank's steering, from friction of the tracks.
-        sway: Standard deviation of steering noise that it can correct.
-        least_throttle: Smallest throttle while driving forward; below 0 brakes with the motor.
+        look_m: Look-ahead distance at rest, m.
+        look_s: Additional look-ahead distance per speed, s.
+        turn: Effect of full steering: for wheels the curvature, tan(full lock) divided by the
+            wheelbase, 1/m; for tracks the rate of turn, rad/s; for a rudder the rate of turn
+            divided by the speed, rad/m.
+        dead: Dead band of a tank's steering, caused by friction of the tracks.
+        sway: Standard deviation of steering noise that the driver can correct.
+        least_throttle: Smallest throttle while driving forward; negative values brake.
     """
 
     body: VehicleModel
@@ -81,7 +81,7 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
         for name, numbers in tomllib.loads(_FILE.read_text("utf-8")).items()
     }
 )
-"""Driving properties by the name of the vehicle."""
+"""Driving properties, keyed by the name of the vehicle."""
 
 
 def traits_of(name: str) -> Traits:
@@ -90,10 +90,10 @@ def traits_of(name: str) -> Traits:
 
 
 def plan_path_for(course: Course, traits: Traits) -> CoursePath:
-    """Plan a path for a vehicle, with less clearance if its own does not fit.
+    """Plan a path for a vehicle, with two thirds of its margin if the whole margin does not fit.
 
-    Passages are as wide as the vehicles of a world need, and a boat in a flooded corridor would
-    need more: 6 of the first 1,300 training courses are too narrow for its clearance.
+    Corridors are made for land vehicles. A boat needs wider passages than 6 of the first 1,300
+    training courses have.
     """
     half_width_m, margin_m, comfort_m = traits.half_width_m, traits.margin_m, traits.comfort_m
     try:
@@ -105,8 +105,7 @@ def plan_path_for(course: Course, traits: Traits) -> CoursePath:
 def _speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
     """Speed at each point of a path, m/s, (N,).
 
-    It is limited by the lateral acceleration in curves, by narrow passages, and by braking before
-    both.
+    Lateral acceleration in curves, narrow passages, and braking before them limit the speed.
     """
     least = traits.half_width_m + traits.margin_m
     comfort = traits.half_width_m + traits.comfort_m
@@ -126,22 +125,22 @@ def _clipped(value: float) -> float:
     return max(-1.0, min(1.0, value))
 
 
-# Time constant of the drift average, s: longer than turns, so that the current remains.
+# Time constant of the average drift angle, s, long enough to average over turns.
 _DRIFT_S: Final = 0.8
-# Rate of turn, rad/s, from which a tank's full dead band is compensated; less below it, so that it
-# does not twitch on straights.
+# Rate of turn, rad/s, above which a tank's whole dead band is compensated. At smaller rates a part
+# is compensated, so that the tank does not twitch on straights.
 _STICKING: Final = 0.1
-# Angle to the target, rad, above which a tank turns on the spot, and the rate of that turn over the
-# angle, 1/s; a slower turn gets stuck in friction.
+# Angle to the target, rad, above which a tank turns on the spot, and the rate of this turn divided
+# by the angle, 1/s. Friction would stop a slower turn.
 _ABOUT: Final = 0.9
 _ABOUT_RATE: Final = 2.5
-# Times, s, after which a driven vehicle that stands still is stuck, and one that is slow scrapes
-# along a wall.
+# A driven vehicle counts as stuck if it stands still for `_PATIENCE_S` seconds, and as scraping
+# along a wall if it is slow for `_SCRAPING_S` seconds.
 _PATIENCE_S: Final = 0.7
 _SCRAPING_S: Final = 3.0
 _ASKED: Final = 0.25  # Throttle or steering above which a vehicle counts as driven.
-# Shares of the top speed below which it stands still and is slow, and rate of turn, rad/s, above
-# which it does not stand still.
+# A vehicle stands still below the first share of its top speed, and is slow below the second. It
+# does not stand still at rates of turn above `_TURNING`, rad/s.
 _STILL: Final = 0.05
 _SLOW: Final = 0.25
 _TURNING: Final = 0.15
@@ -149,8 +148,8 @@ _BACK_AT_MOST_S: Final = 4.0
 _BACK_THROTTLE: Final = -0.6
 _SPEED_GAIN: Final = 1.5  # Gain from speed error to throttle, both relative to their maxima.
 _REACTION_S: Final = 0.15  # Delay from an action to its effect, over which the pose is predicted.
-# Angle to the target, rad, above which a vehicle must turn before it can go on, and clearance ahead
-# of the nose, m, that is too small for that.
+# Angle to the target, rad, above which a vehicle must turn before it drives on, and the clearance
+# ahead of the nose, m, below which it cannot turn.
 _ASIDE: Final = 0.7
 _BLOCKED_M: Final = 0.15
 
@@ -169,7 +168,7 @@ class _Recovery:
     def watch(
         self, action: tuple[float, float], speed: float, yaw_rate: float, *, blocked: bool
     ) -> None:
-        """Update the timers from steering and throttle and their effect, m/s and rad/s.
+        """Update the timers from steering and throttle, speed, m/s, and rate of turn, rad/s.
 
         `blocked` states whether an obstacle ahead prevents a necessary turn.
         """
@@ -178,8 +177,8 @@ class _Recovery:
         turned = self._traits.drive == "tracks" and abs(action[0]) > _ASKED
         straight = abs(yaw_rate) < _TURNING  # Turning on the spot is progress.
         still = share < _STILL and straight
-        # A boat with its bow at a quay turns until its stern touches as well, and then is stuck for
-        # good; a car scrapes along. A tank turns away on the spot.
+        # With its bow at a wall, a boat turns until its stern touches too and it cannot move, and a
+        # car scrapes along the wall. A tank can turn away on the spot.
         still |= blocked and share < _SLOW and action[1] > 0 and self._traits.drive != "tracks"
         self._still_s = self._still_s + PERIOD_S if still and (driven or turned) else 0.0
         self._slow_s = self._slow_s + PERIOD_S if share < _SLOW and straight and driven else 0.0
@@ -208,11 +207,11 @@ class _Recovery:
         if self._tries > 2 and self._rng.random() < 0.4:
             side = -side
         if self._traits.drive == "rudder" and scraping:
-            # A rudder swings the stern, which a quay at its side prevents. Steering towards the
-            # quay puts the bow there and frees the stern; then the boat backs away.
+            # A rudder moves the stern, but a quay at the side blocks the stern. Steering towards
+            # the quay frees the stern; then the boat moves backwards.
             self._moves.append((1.5 * longer, side, 0.5))
         seconds = (2.5 if self._traits.drive == "rudder" else 1.0) * longer
-        # Going back, wheels and rudders turn the other way; tracks do not.
+        # When driving backwards, wheels and rudders turn the vehicle the other way; tracks do not.
         turn = side * min(1.0, 0.4 + abs(angle)) * (-0.5 if self._traits.drive == "tracks" else 1.0)
         self._moves.append((min(seconds, _BACK_AT_MOST_S), turn, _BACK_THROTTLE))
         self._begin_move()
@@ -232,7 +231,7 @@ class CourseExpert:
         path: The path, if it is already planned.
 
     Attributes:
-        path: The path that it follows.
+        path: Path that the expert follows.
         speeds: Speed at each point of the path, m/s, (N,).
     """
 
@@ -254,11 +253,11 @@ class CourseExpert:
         self._recovery = _Recovery(self._traits, self._rng)
 
     def act(self, pose: Pose, speed: float, yaw_rate: float = 0.0) -> NDArray[np.float32]:
-        """Choose steering and throttle, -1 to 1, (2,); -1 steers left. Call it once per period.
+        """Choose steering and throttle, -1 to 1, (2,), once per period; -1 steers left.
 
         Args:
             pose: Pose of the vehicle.
-            speed: Speed along its heading, m/s.
+            speed: Speed along the heading, m/s.
             yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
         """
         if self._station is None:
@@ -287,15 +286,15 @@ class CourseExpert:
         dx, dy = pose.x - before.x, pose.y - before.y
         going = math.hypot(dx, dy) / PERIOD_S > 0.2 * self._traits.body.top_speed_mps
         now = math.remainder(math.atan2(dy, dx) - pose.heading, math.tau) if going else 0.0
-        if abs(now) > math.pi / 3:  # Astern, or moved by hand.
+        if abs(now) > math.pi / 3:  # The vehicle moves backwards, or a person moved it.
             now = 0.0
         self._drift += (now - self._drift) * PERIOD_S / _DRIFT_S
 
     def _steering(self, angle: float, distance: float, speed: float, yaw_rate: float) -> float:
-        """Steering towards a point, at an angle from the heading, rad, from -1, left, to 1."""
+        """Steering, -1 (left) to 1, to a point at an angle from the heading, rad."""
         traits = self._traits
         fast = max(speed, 0.3 * traits.body.top_speed_mps)
-        # Curvature of the circle to the target, 1/m; targets behind count as abeam.
+        # Curvature of the circle to the target, 1/m. Targets behind count as being to the side.
         side = math.sin(angle) if abs(angle) < math.pi / 2 else math.copysign(1.0, angle)
         curvature = 2 * side / distance
         match traits.drive:
@@ -333,7 +332,7 @@ class CourseExpert:
         traits = self._traits
         here = self.path.index(spot.station)
         wanted = float(self.speeds[here])
-        # Off the path there is less room than planned, and a wrong heading must be corrected.
+        # Drive slower with less room than planned, and with a wrong heading.
         room = float(self.path.clearance[here]) - abs(spot.lateral) - traits.half_width_m
         if room < traits.margin_m:
             wanted *= 0.5 + 0.5 * max(room, 0.0) / traits.margin_m

@@ -1,9 +1,9 @@
 """Planning of a smooth, collision-free path around a course.
 
-The cheapest way over a lattice decides on which side to pass each obstacle; the path is then the
-least bent line between bounds around that way. Its points are `middle + offset * left`, so the sum
-of its squared second differences is a quadratic function of the offsets, and the best offsets are
-the solution of a convex problem. Racing lines are found like this: F. Braghin et al., "Race driver
+The cheapest way through a lattice decides on which side to pass each obstacle. The path is the
+least bent line between bounds around this way. The points of a line are `middle + offset * left`,
+so the sum of its squared second differences is a quadratic function of the offsets, and the best
+offsets solve a convex problem. Racing lines are computed like this: F. Braghin et al., "Race driver
 model", Computers and Structures 86 (2008); A. Heilmeier et al., "Minimum curvature trajectory
 planning", Vehicle System Dynamics 58 (2020).
 """
@@ -24,12 +24,12 @@ _STATION_M: Final = 0.2
 _OFFSET_M: Final = 0.1
 _SLOPES: Final = np.arange(-2, 3)  # Changes of the offset between stations, in `_OFFSET_M`.
 # Costs of changing the slope by one, of a slope of one, and of a point with the smallest allowed
-# clearance, which is quadratic in what is missing to the preferred clearance.
+# clearance. The last cost is quadratic in the clearance that a point lacks.
 _BEND_COST: Final = 0.15
 _SLANT_COST: Final = 0.02
 _NARROW_COST: Final = 1.0
-# Length of the search beyond a whole lap, m. A way hardly depends on its offset that far back, so
-# that a lap cut from the middle is closed.
+# Length of the search beyond a whole lap, m. A way hardly depends on the offset at which the search
+# began that far back, so a lap from the middle of the search is closed.
 _OVERLAP_M: Final = 12.0
 # Over-relaxation: 1.5 to 1.8 converge faster than 1 (S. Boyd et al., "Distributed Optimization and
 # Statistical Learning via the Alternating Direction Method of Multipliers", 2011, section 3.4.3).
@@ -38,11 +38,11 @@ _RELAXATION: Final = 1.6
 _SPACING_M: Final = 0.1  # Approximate distance between the points of a path.
 # Weight of the preferred offsets, 1/m^4: a curvature of 1/m costs as much as `1 / sqrt(_PULL)` m.
 _PULL: Final = 0.02
-_ATTEMPTS: Final = 8  # To push a line away from obstacles.
+_ATTEMPTS: Final = 8  # Largest number of attempts to move a line away from obstacles.
 
 
 class _Lattice:
-    """Rows of K points across the lane of a course, at N stations along it, and ways through them.
+    """Points across the lane of a course, K at each of N stations, and ways through the points.
 
     A vehicle's path has a clearance of at least `least_m`, and prefers `comfort_m`.
     """
@@ -56,7 +56,7 @@ class _Lattice:
         step = line.length / count
         at_m = np.arange(count) * line.length / count
         half_width = np.interp(at_m, line.stations, course.half_width, period=line.length)
-        # The direction over 0.8 m; rows would cross each other in tight corners with a shorter one.
+        # Directions are averaged over 0.8 m; otherwise rows would cross in tight corners.
         ahead = np.roll(middle, -2, axis=0) - np.roll(middle, 2, axis=0)
         ahead /= np.linalg.norm(ahead, axis=1)[:, None]
         left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
@@ -73,10 +73,10 @@ class _Lattice:
         self._offsets, self._clearance = offsets, clearance  # m, (K,) and (N, K).
 
     def path(self, spare_m: float) -> CoursePath | None:
-        """A smooth path on the cheapest way, or None.
+        """Return a smooth path along the cheapest way, or None if smoothing fails.
 
-        Points with less than the least clearance and a spare are forbidden. Raises a `WorldError`
-        if there is no way.
+        Points with a clearance below the least clearance plus `spare_m` are forbidden. Raises a
+        `WorldError` if there is no way.
         """
         least_m = self._least_m + spare_m
         comfort_m = max(self._comfort_m, self._least_m + 0.05)
@@ -93,7 +93,7 @@ class _Lattice:
         return self._smoothed(np.roll(way[seam : seam + count], seam))
 
     def _smoothed(self, way: NDArray[np.int64]) -> CoursePath | None:
-        """A smooth path that passes all obstacles on the same sides as a way, or None."""
+        """Return a smooth path with all obstacles on the same sides as on a way, or None."""
         extra = np.zeros(len(way))
         for _ in range(_ATTEMPTS):
             low, high = self._room(way, extra)
@@ -115,7 +115,7 @@ class _Lattice:
         """Bounds of the offset at each station, m, with the preferred clearance where it fits."""
         low, high = np.empty(len(way)), np.empty(len(way))
         for i, k in enumerate(way):
-            # They always include the way, so bounds of neighbours overlap.
+            # The bounds always include the way, so the bounds of neighbours overlap.
             clear = float(self._clearance[i, k])
             least = self._least_m + extra[i]
             wanted = min(max(self._comfort_m, least), clear - 0.02 + extra[i])
@@ -134,7 +134,7 @@ class _Lattice:
             return here
         inside, outside = float(clearance[k]), float(clearance[beyond])
         if outside == 0.0 or inside <= wanted or outside >= inside:
-            return here  # 0 may mark a point outside the lane.
+            return here  # A clearance of 0 may mean a point outside the lane.
         share = (inside - wanted) / (inside - outside)
         return here + min(share, 1.0) * (float(offsets[beyond]) - here)
 
@@ -142,10 +142,10 @@ class _Lattice:
 def _search(
     cost: Array, stations: NDArray[np.int64], seam: int | None, least_m: float
 ) -> NDArray[np.int64]:
-    """The cheapest way along stations, (M,), as indices of offsets, (M,); cost is (N, K).
+    """Return the cheapest way along stations, (M,), as indices of offsets, (M,); cost is (N, K).
 
-    It is found by dynamic programming, with offset and slope as the state. `seam` is the offset to
-    start and end with; None leaves both free.
+    The state of the dynamic programming is offset and slope. `seam` is the index of the first and
+    last offset; None for any.
     """
     width = cost.shape[1]
     bends = _BEND_COST * (_SLOPES[:, None] - _SLOPES[None, :]) ** 2  # (from, to)
@@ -187,7 +187,7 @@ def _search(
 
 
 def _least_bent(middle: Array, left: Array, low: Array, high: Array, wish: Array) -> Array:
-    """Offsets of the least bent closed line between bounds, with preferred offsets `wish`.
+    """Return the offsets of the least bent closed line between bounds; `wish` are preferred ones.
 
     The alternating direction method approximates the solution, and an active-set step refines it.
     SciPy's `lsq_linear` takes 3.7 times as long for lines of a course's size.
@@ -252,16 +252,16 @@ class CoursePath(ClosedLine):
 def plan_path(
     course: Course, half_width_m: float, margin_m: float, *, comfort_m: float
 ) -> CoursePath:
-    """Plan a smooth path around a course, or raise a `WorldError` without one.
+    """Plan a smooth path around a course, or raise a `WorldError` if there is no path.
 
     Args:
         course: The course.
         half_width_m: Half width of the vehicle, m.
-        margin_m: Smallest clearance to each side of it at every point of the path, m.
-        comfort_m: Preferred clearance to each side of it, m.
+        margin_m: Smallest clearance on each side of the vehicle, m.
+        comfort_m: Preferred clearance on each side of the vehicle, m.
     """
     lattice = _Lattice(course, half_width_m + margin_m, half_width_m + comfort_m)
-    # Between two lattice points the line may come closer to obstacles, so ask for a spare first.
+    # A line between two lattice points may come closer to obstacles, so first try extra clearance.
     for spare in (0.03, 0.0):
         try:
             path = lattice.path(spare)

@@ -1,6 +1,6 @@
-"""A policy that drives at full throttle, as the process on board does, and fails at a signal.
+"""A program that drives a robot at full throttle, and fails when it receives a signal.
 
-It is a program for the trials of a robot: see `shapechanger.robot.twin.check.driver`.
+Trials of a robot run this program; see `shapechanger.robot.twin.check.driver`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.twin.check.driver import FAILURES, asked_robot, print_time
 from shapechanger.vehicles.remote.pilot import PolicyDriver
 
-# Longer than the age at which a robot refuses answers to an observation.
+# Delay of a late action, s, longer than the age at which a robot refuses an action.
 _LATE_S: Final = 0.5
 
 
@@ -38,7 +38,7 @@ class FullThrottle:
             signal.signal(number, self._fail)
 
     def predict(self, picture: object, state: object = None) -> object:
-        """Return full throttle, or fail."""
+        """Return full throttle, unless a signal has chosen a failure."""
         del picture, state
         while self._failing == "hangs":
             time.sleep(_LATE_S)

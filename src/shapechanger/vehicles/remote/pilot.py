@@ -31,36 +31,36 @@ from shapechanger.robot.link.card import RobotCard
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 
-# s. A reset waits in steps of this length, and checks between them whether to end.
+# Interval at which a waiting reset checks whether to end, s.
 _LOOK_EVERY_S: Final = 1.0
 _END_S: Final = 10.0
 _WAITS_ON_BOARD: Final = "It waits until no client has control and you arm the robot for it."
 
 
 def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
-    """Refuse a policy that does not fit a robot; the message names what differs.
+    """Raise an error that names the difference if a policy does not fit a robot.
 
     Args:
         card: Card of the policy.
         robot: Card of the robot.
-        measures: Whether the vehicle's turning may be measured before it drives.
+        measures: Whether the vehicle's turning can be measured before the policy drives.
 
     Raises:
         PolicyError: If body, rate, actions or state differ.
-        RobotRefused: If the robot lacks a camera, how it looks, or how the vehicle turns.
+        RobotRefused: If the robot lacks a camera, or the card lacks its geometry or the turning.
     """
     net = card.network
     if net.body and net.body != robot.body:
         raise PolicyError(
-            f"The policy learned to steer a {net.body}, and {robot.robot} is a {robot.body}: only "
-            "policies of waypoints move from one body to another."
+            f"The policy learned to steer a {net.body}, but {robot.robot} is a {robot.body}: only "
+            "policies with waypoints can drive other bodies."
         )
     jitter = card.data.get("rate_jitter", 0.0)
     jitter = float(jitter) if isinstance(jitter, int | float) else 0.0
     if (hz := net.control_hz) is not None and not is_same_rate(hz, robot.control_hz, jitter):
         within = f" (varying by {100 * jitter:.0f} %)" if jitter else ""
         raise PolicyError(
-            f"The policy learned at {hz:g} actions a second{within}, and {robot.robot} has "
+            f"The policy learned at {hz:g} actions a second{within}, but {robot.robot} has "
             f"control_hz = {robot.control_hz:g}."
         )
     has_waypoints = _has_waypoints(card)
@@ -68,7 +68,7 @@ def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
         actions, state = map(Layout.from_json, (robot.action_layout, robot.state_layout))
         card.require_layouts(actions, state)
     if net.eyes != "none" and robot.image_size is None:
-        raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by images.")
+        raise RobotRefused(f"{robot.robot} has no camera, but the policy needs images.")
     if has_waypoints and None in (robot.camera_pitch_deg, robot.camera_fovy_deg):
         raise RobotRefused(
             f"The profile of {robot.robot} does not state pitch_deg and fovy_deg of its camera, "
@@ -82,10 +82,10 @@ def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
 
 
 def require_policies(path: Path, robot: RobotCard) -> None:
-    """Refuse a policy on board, or a folder of them, that does not fit a robot.
+    """Check that the policy, or each policy of the folder, at `path` can drive a robot on board.
 
     Raises:
-        PolicyError: If there is no policy, or one does not fit.
+        PolicyError: If there is no policy, or a policy does not fit the robot.
     """
     if not path.exists():
         raise PolicyError(no_policy_file(path, what="file or folder"))
@@ -109,20 +109,19 @@ def _has_waypoints(card: PolicyCard) -> bool:
 
 
 class PolicyDriver:
-    """A policy that drives between a person's permission and their next intervention, or waits.
+    """Drives a robot by a policy from a person's permission to the person's next intervention.
 
-    It connects as a program, in the thread that calls `run`, or in one of its own from `__enter__`
-    to `__exit__`.
+    `run` drives in the thread that calls it. As a context manager, the driver has its own thread.
 
     Args:
         policy: The policy.
         name: Displayed name.
         robot: Address and credentials of the robot.
-        on_note: Called with its state whenever that changes.
-        waits: Note to display while it waits; "" for instructions at a terminal.
+        on_note: Called with the driver's state, as text, whenever the state changes.
+        waits: Text to display while the driver waits; "" for instructions at a terminal.
 
     Attributes:
-        note: Its state, for display.
+        note: State of the driver, as text for display.
     """
 
     def __init__(
@@ -153,7 +152,7 @@ class PolicyDriver:
         self._thread.join(_END_S)
 
     def end(self) -> None:
-        """Let `run` return, after the robot is released."""
+        """Make `run` release the robot and return."""
         self._ended.set()
 
     def require_well(self) -> None:
@@ -166,7 +165,7 @@ class PolicyDriver:
         env = self._env()
         try:
             while not self._ended.is_set():
-                # Refused while the robot is disarmed or held by another client.
+                # A reset is refused while the robot is disarmed or another client has control.
                 with contextlib.suppress(RobotRefused):
                     self._drive(env, env.reset()[0])
         finally:
@@ -205,7 +204,7 @@ class PolicyDriver:
         while not self._ended.is_set():
             action = self._policy.predict(*self._perceived(observation))
             if not np.isfinite(action).all():
-                # The robot would refuse it, too, and stop.
+                # The robot would also refuse the action, and stop.
                 raise PolicyError(f"The policy gave {action.tolist()}, which is not finite.")
             observation, _, terminated, truncated, info = env.step(action)
             yields = "intervene_action" in info
@@ -251,7 +250,7 @@ def main() -> int:
             policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
         )
 
-        def end_with_input() -> None:  # The daemon, or its end, closes the input.
+        def end_with_input() -> None:  # The daemon closes the input, at the latest when it ends.
             while sys.stdin.readline():
                 pass
             driver.end()

@@ -1,4 +1,4 @@
-"""`RemoteWaypoint-v1`: a vehicle on the network with the camera and the action of all vehicles."""
+"""`RemoteWaypoint-v1`: a vehicle on the network with rectified images and waypoints as actions."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ class RemoteWaypointEnv(WaypointView):
 
     The camera's frames are warped to the virtual camera of `WaypointEnv`, by the pitch and the
     field of view that the robot's profile states (`shapechanger robot camera` measures them). The
-    vehicle turns waypoints into steering by its own `SteeringResponse`. The first reset measures it
-    unless the profile states it or it is given: **the robot drives for 5 s with random commands**,
-    at 0.4 to 0.8 of its throttle, without looking where it goes; its guard's limits and reflexes
-    hold. Put it on free ground for that. The env then waits for the operator again, who puts it at
-    the start.
+    env converts waypoints to steering by the vehicle's `SteeringResponse`. If neither `response`
+    nor the profile gives the response, the first reset measures it: **the robot drives for 5 s with
+    random commands**, at 0.4 to 0.8 of its throttle, without looking where it goes. Limits and
+    reflexes of the guard still act. Put the robot on free ground for the measurement. The env then
+    waits again until the operator has put the robot at the start.
 
     ## Action space and observation space
-    Those of `WaypointEnv`.
+    The same as in `WaypointEnv`.
 
     ## Reward, start, end and info
-    Those of `RemoteVehicleEnv`.
+    The same as in `RemoteVehicleEnv`.
 
     Args:
         robot: Name of a known robot, or its address, HOST or HOST:PORT.
-        response: Turn for each metre, rad/m, and for each second, rad/s, at full steering, as a
-            former env measured them (`response`); None for those of the robot's profile, or to
-            measure them in the first reset.
-        options: Further arguments of `RemoteVehicleEnv`, but for `size`, `state` and `image`.
+        response: Turn for each metre, rad/m, and for each second, rad/s, at full steering, such as
+            the attribute `response` of an earlier env; None to use the robot's profile or to
+            measure the response in the first reset.
+        options: Further arguments of `RemoteVehicleEnv`, except `size`, `state` and `image`.
 
     Attributes:
-        response: How the vehicle turns; None before the first reset.
+        response: Response of the vehicle to steering; None before the first reset.
 
     Raises:
         RobotRefused: If the robot is not a vehicle, the geometry of its camera is unknown, its
-            camera does not see what policies for all vehicles look at, or it does not measure its
-            speed or, without a given response, its rate of turn.
-        StudyError: If the vehicle does not turn as it steers.
+            camera does not cover the virtual camera's view, or it does not measure its speed or,
+            if the response is unknown, its rate of turn.
+        StudyError: If the vehicle does not turn in the direction of the steering.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  # Gymnasium's.
@@ -60,7 +60,7 @@ class RemoteWaypointEnv(WaypointView):
                 self.response = SteeringResponse(*welcome.turning)
             if (names := env.action_layout.names) != ("steering", "throttle"):
                 raise RobotRefused(
-                    f"Waypoints become steering and throttle, and {welcome.robot} has {names}."
+                    f"Waypoints need steering and throttle, but {welcome.robot} has {names}."
                 )
             sensors = ("speed", "yaw_rate")[: 1 + (self.response is None)]
             camera = welcome.camera_pitch_deg, welcome.camera_fovy_deg, welcome.image_size
@@ -82,7 +82,8 @@ class RemoteWaypointEnv(WaypointView):
     ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
         """Measure the response if it is unknown, and bring the robot to the start.
 
-        Raises a `StudyError` if the vehicle does not turn as it steers; else as `RemoteVehicleEnv`.
+        Raises a `StudyError` if the vehicle does not turn in the direction of the steering, and the
+        errors of `RemoteVehicleEnv.reset`.
         """
         if self.response is None:
             self.response = measure_response(self._env, *self._motion_at)
