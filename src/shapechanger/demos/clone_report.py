@@ -42,8 +42,8 @@ def write_report(
 ) -> Path:
     """Write the report of a policy with this name, and its numbers as JSON next to it.
 
-    The data are the steps that it was evaluated on, which `evaluation.worst` indexes, and the note
-    is a sentence on them. The file of the numbers is returned.
+    The policy was evaluated on the steps of the data; `evaluation.worst` has indices of the data,
+    and the note describes the data. The path of the JSON file is returned.
 
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
@@ -77,7 +77,7 @@ def write_report(
 
 
 def _worst(policy: Clone, data: Dataset, evaluation: EvaluationResult) -> list[dict[str, Any]]:
-    """The steps with the largest errors: what the driver did, and what the policy did."""
+    """Return the actions of the driver and of the policy in the steps with the largest errors."""
     chosen = list(evaluation.worst)
     pictures = None if data.pictures is None else data.pictures[chosen]
     states = None if data.states is None else data.states[chosen]
@@ -93,7 +93,7 @@ def _worst(policy: Clone, data: Dataset, evaluation: EvaluationResult) -> list[d
         source = ""
         if pictures is not None:
             source = png_uri(pictures[i].repeat(_MAGNIFICATION, 0).repeat(_MAGNIFICATION, 1))
-        # The last folder identifies the recording; a whole path would hide the rest.
+        # Show only the last folder, which identifies the recording.
         caption = f"{data.files[step].split('/')[-1]}: the driver did {driver}, the policy {did}"
         frames.append({"source": source, "caption": caption})
     return frames
@@ -103,7 +103,7 @@ def _worst(policy: Clone, data: Dataset, evaluation: EvaluationResult) -> list[d
 # demonstrations: the mean of all clones. Measured over 9 km each by `python -m benchmarks.run
 # corrections`.
 EXPERT: Final = {2: 3.52, 4: 1.06, 10: 0.84}
-# The same after half of the minutes were corrections of a clone's own driving.
+# Collisions per 100 m if half of the minutes were corrections of a clone's driving.
 CORRECTED: Final = {4: 0.91, 20: 0.38}
 _MINUTE_S: Final = 60.0
 
@@ -111,8 +111,8 @@ _MINUTE_S: Final = 60.0
 def outlook(card: PolicyCard) -> str:
     """Return sentences on the collisions to expect of a cloned driver, and on the next step.
 
-    They are "" if the policy does not steer by images, or its card has no `learned_s`: the rates
-    were measured with a car in corridors.
+    Both texts are "" if the policy does not steer by images, or its card has no `learned_s`. The
+    rates were measured with a car in corridors.
     """
     learned_s = card.data.get("learned_s", 0.0)
     names = () if card.action is None else card.action.names
@@ -133,7 +133,7 @@ def outlook(card: PolicyCard) -> str:
 
 
 def calibration_chart(bins: tuple[Bin, ...]) -> str:
-    """Plot accuracy over confidence; each point is labelled with its number of steps."""
+    """Plot accuracy against confidence; labels are the numbers of steps."""
 
     def draw(_: Figure, axes: Axes) -> None:
         axes.plot([0, 1], [0, 1], **_DIAGONAL)
@@ -148,7 +148,7 @@ def calibration_chart(bins: tuple[Bin, ...]) -> str:
 
 
 def scatter_chart(evaluation: EvaluationResult, place: int) -> str:
-    """Plot one number of each action: the policy's over the driver's."""
+    """Plot one number of the actions: the policy's against the driver's."""
 
     def draw(_: Figure, axes: Axes) -> None:
         target, predicted = np.array([evaluation.target, evaluation.predicted])[:, :, place]

@@ -18,13 +18,13 @@ from shapechanger.finger.tensions import drive_of
 
 # Distance of a joint from either end, as a fraction of its range.
 _MARGIN: Final = 0.1
-# A flexed finger hardly spreads: fraction of the abduction range left at full flexion. Chosen.
+# Share of the abduction range that is left at full flexion, chosen small.
 _SPREAD_LEFT: Final = 0.3
 # Friction changes its sign smoothly around this speed, rad/s.
 _STICKS_BELOW: Final = 0.1
 START_SPREAD: Final = 0.1
 """Largest distance of starts from the rest posture, rad."""
-# Data per thread, because envs run in threads, and creating it takes longer than using it.
+# Each thread reuses its own MjData, because envs run in threads and creating MjData is slow.
 _own: Final = threading.local()
 
 
@@ -37,11 +37,11 @@ def draw_posture(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def coupled(flexion: Any, abduction: Any, middle: Any, off: Any) -> tuple[Any, Any, Any, Any]:
-    """Return angles of a finger with its tissue from independent ones, rad, arrays or tensors.
+    """Return joint angles, rad, arrays or tensors, that the tissue of a finger allows.
 
-    `abduction` is the straight knuckle's, which has less when flexed; `off` is the angle of
-    the end joint beyond the one that follows from the middle joint. The nominal finger can hold all
-    angles within `inner_range`.
+    `abduction` is the abduction of a straight knuckle; flexion reduces it. `off` is the difference
+    of the end joint from its coupled angle. The nominal finger can hold all angles within
+    `inner_range`.
     """
     share = 1.0 - (1.0 - _SPREAD_LEFT) * flexion.clip(0.0) / float(JOINT_RANGE[0, 1])
     return flexion, abduction * share, middle, DIP_BY_PIP * middle + off
@@ -72,8 +72,8 @@ def joint_torque(
 ) -> NDArray[np.float64]:
     """Return the torques, N·m, (4,), that a motion of a finger with stiff tendons needs.
 
-    They overcome inertia, weight, passive tissue and friction. Angles are in rad, speeds in rad/s
-    and accelerations in rad/s², (4,) each; `data` is overwritten.
+    The torques balance inertia, weight, passive tissue and friction. Angles are in rad, speeds in
+    rad/s and accelerations in rad/s², (4,) each; `data` is overwritten.
     """
     data.qpos[:] = angles
     data.qvel[:] = speed
@@ -97,7 +97,7 @@ def _nominal() -> mujoco.MjModel:
 
 
 _STEPS: Final = 60
-# Well below any tolerance of a task, m.
+# Error at which the search ends, m, far below the tolerance of any task.
 _CLOSE_ENOUGH_M: Final = 1e-6
 # Weight of the preference that the end joint follows the middle one, m/rad, relative to reaching
 # the point.
@@ -109,7 +109,7 @@ _MOST_STEP_RAD: Final = 0.5
 # Factors by which the damping grows after a worse step, and falls after a better one.
 _GROWS: Final = 4.0
 _FALLS: Final = 16.0
-# With a larger error, m, the search is repeated from hyperextended, half and fully flexed.
+# Error, m, above which the search is repeated from hyperextended, half and fully flexed.
 _FAR_M: Final = 1e-5
 _STARTS: Final = tuple(
     np.array([low + share * (high - low), 0.0, *(share * JOINT_RANGE[2:, 1])])
@@ -125,8 +125,8 @@ def angles_for(
 
     Damped Gauss-Newton steps, kept within the joints' ranges. Among the angles for a point, m,
     (3,), angles near the start with the end joint within the band of the hood are preferred. `near`
-    are angles to start from, rad, (4,); by default those of a finger at rest. The distance of the
-    fingertip from the point, m, is returned too.
+    are angles to start from, rad, (4,); by default the angles at rest. The second result is the
+    distance of the fingertip from the point, m.
     """
     best = _search(place, JOINT_REST if near is None else near)
     if best[1] > _FAR_M:
@@ -139,7 +139,7 @@ def angles_for(
 def _search(
     place: NDArray[np.float64], start: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the angles, rad, (4,), that a search from `start` ends with, and their error, m."""
+    """Return the angles, rad, (4,), at the end of a search from `start`, and their error, m."""
     low, high = JOINT_RANGE.T
     q = np.clip(start, low, high)
     coupling = np.array([[0.0, 0.0, -DIP_BY_PIP, 1.0]])

@@ -20,7 +20,7 @@ _TARGET: Final = Element("task", "target")
 TOLERANCE_M: Final = 0.005
 """Distance from the target within which the fingertip must stay, m."""
 HELD_STEPS: Final = 10
-"""Steps for which it must stay there without a break: 0.2 s."""
+"""Number of consecutive steps for which the fingertip must stay there: 0.2 s."""
 
 
 class FingerReachEnv(FingerEnv):
@@ -31,9 +31,9 @@ class FingerReachEnv(FingerEnv):
     pull several joints at once, so a posture needs most of them together.
 
     ## Action space
-    `Box(-1, 1, (7,), float32)`, one command per tendon, which acts for 0.02 s. The argument
-    `actions` sets its meaning: "impedance", a muscle whose pull grows with its length; "tension";
-    or "length".
+    `Box(-1, 1, (7,), float32)`, one command per tendon, which lasts 0.02 s. The argument `actions`
+    sets the meaning of a command: "impedance", a muscle whose tension grows with its length;
+    "tension"; or "length".
 
     | Num | Action        | Min | Max | Unit |
     | --- | ------------- | --- | --- | ---- |
@@ -46,10 +46,10 @@ class FingerReachEnv(FingerEnv):
     | 6   | `PI/command`  | -1  | 1   | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (38,), float64)`: angles and velocities of the joints; tensions, lengths beyond
-    the straight finger and newest commands of the tendons; the fingertip by those angles; the
-    target; and the vector from the fingertip to it. Places are in the finger's frame: x to the tip
-    of the straight finger, y to the thumb, z to the back of the hand.
+    `Box(-inf, inf, (38,), float64)`: angles and velocities of the joints; tensions, lengths
+    relative to the straight finger, and newest commands of the tendons; the fingertip computed from
+    the angles; the target; and the vector from the fingertip to the target. Positions are in the
+    finger's frame: x to the tip of the straight finger, y to the thumb, z to the back of the hand.
 
     | Num   | Observation           | Min      | Max    | Unit  |
     | ----- | --------------------- | -------- | ------ | ----- |
@@ -90,22 +90,22 @@ class FingerReachEnv(FingerEnv):
     reward_change   =  -0 dt mean over the tendons of (change of the command)²
     ```
 
-    With `goal=True` it is -1 where the measured fingertip is farther than 5 mm from the target and
-    0 elsewhere, like `compute_reward`.
+    With `goal=True` the reward is -1 if the measured fingertip is farther than 5 mm from the
+    target, and otherwise 0, like `compute_reward`.
 
     ## Start
     At rest, within 0.1 rad of the posture of a hand at rest, all tendons just taut. The target is
     the fingertip of a random posture that the nominal finger can hold, at least a tenth of its
-    range away from each limit. A weaker finger of a gap may not come to all of them.
+    range away from each limit. A weaker finger of a gap may not reach all targets.
 
     ## End
     Never terminated. Truncated after 100 steps, 2 s.
 
     ## Info
     `is_success`, whether the fingertip has been within 5 mm for the last 0.2 s; `distance`, m, of
-    the true fingertip; `target`, m; `smoothness`, 1 minus the mean change of the commands over
-    their range; `reward_nearness`, `reward_effort` and `reward_change` (with `goal=True`
-    `reward_goal`); `diverged` where the simulation diverged.
+    the true fingertip from the target; `target`, m; `smoothness`, 1 minus half the mean change of
+    the commands; `reward_nearness`, `reward_effort` and `reward_change` (with `goal=True`
+    `reward_goal`); `diverged` if the simulation diverged.
 
     ## Versions
     v1: the first.
@@ -127,7 +127,7 @@ class FingerReachEnv(FingerEnv):
         target = place_features("target", _TARGET)
         if goal:
             achieved = [Feature(f"achieved/{axis}", "m", element=_TARGET) for axis in "xyz"]
-            # The order in which Gymnasium flattens a Dict.
+            # Gymnasium flattens a Dict in this order.
             features = [*achieved, *target, *senses]
             self.observation_space = gym.spaces.Dict(
                 {
@@ -148,12 +148,12 @@ class FingerReachEnv(FingerEnv):
         """Start an episode.
 
         Args:
-            seed: Seed of all randomness from here on; None keeps the present generator.
-            options: `posture`, four angles, rad, to start at; `target`, m, (3,), or four angles
-                whose fingertip it is. Omitted ones are drawn.
+            seed: Seed of the env's random generator; None keeps the present generator.
+            options: `posture`, four start angles, rad; `target`, a point, m, (3,), or four angles
+                that place the fingertip at the target. Omitted options are drawn.
 
         Raises:
-            UnknownName: If there is no such option.
+            UnknownName: If the name of an option is unknown.
             FingerError: If a posture or a target is malformed or out of range.
         """
         super().reset(seed=seed)
@@ -164,7 +164,7 @@ class FingerReachEnv(FingerEnv):
             target = fingertip(target) if target.shape == (4,) else target
             if target.shape != (3,) or not np.isfinite(target).all():
                 raise FingerError(
-                    f"A target must be three finite numbers, m, or four angles; got {given}."
+                    f"A target must be three finite numbers, m, or four angles, rad; got {given}."
                 )
         self._target = target
         senses = self._place(options)

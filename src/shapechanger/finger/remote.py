@@ -31,47 +31,48 @@ from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
 NOMINAL_TWIN: Final = "nominal"
 """Name of the twin with the parameters of the nominal finger."""
 
-# Tolerance of the start posture, rad, and time limit, s. If gears stick, the episode begins where
-# the finger is.
+# Tolerance of the start posture, rad, and time limit to reach it, s. If gears stick, the episode
+# begins at the posture that was reached.
 _START_OFF_RAD: Final = 0.03
 _START_S: Final = 1.0
 # Time for the pretension to wind in slack, s.
 _SLACK_S: Final = 0.6
-# Silence after which the link is lost, s; the clock of an own twin waits for a busy machine.
+# Times without a message after which the link is lost, s: of a robot, and of the env's own twin,
+# which may have to wait for a busy machine.
 _TIMEOUT_S: Final = 2.0
 _OWN_TIMEOUT_S: Final = 30.0
 # Prefixes of infos that concern driving only.
 _DRIVING: Final = ("reward", "frame", "captured_ns")
-# Arguments that a simulated finger has, too.
+# Arguments that `FingerEnv` also has.
 _SHARED: Final = ("reward", "render_mode", "width", "height")
 
 
 class RigMixin(FingerEnv):
     """Mixin that performs a task of the finger on a rig.
 
-    The simulation is never stepped: it mirrors the rig, for rendering and rewards.
+    The simulation is never stepped: it shows the state of the rig for rendering and rewards.
 
     Args:
         robot: Name of a known rig, or its address as HOST or HOST:PORT. A twin of the profile
-            "finger" that is served on this machine is known under that name.
-        task: Arguments of the task's own env.
-        twin: A twin that this env serves itself instead of connecting to `robot`: "nominal", or the
-            name of the gap that its finger is drawn from; "" for none.
-        finger_seed: Seed of the finger drawn from that gap; 0 if not given.
+            "finger" that runs on this machine has the name "finger".
+        task: Arguments of the class of the task.
+        twin: Twin that this env runs instead of connecting to `robot`: "nominal", or the name of
+            the gap from which its finger is drawn; "" to connect to `robot`.
+        finger_seed: Seed of the finger drawn from the gap; None for 0.
         twin_folder: Folder of a twin on this machine, for its true state; "" for none.
-        actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
+        actions: Meaning of an action; see `shapechanger.finger.tensions.DRIVES`.
         **more: `reward`, `render_mode` (of the finger as measured), `width` and `height` of
             `FingerEnv`; `key` and `fingerprint`, for an address, `on_reset`, `on_waiting` and
             `reset_timeout_s` of `RemoteVehicleEnv`.
 
     Raises:
-        UnknownName: If no rig of this name is known, or there is no such mode of action or weight.
+        UnknownName: If the name of the rig, mode of action or weight is unknown.
         LinkError: If the rig cannot be reached, or is not trusted.
-        RobotRefused: If it refuses the connection, or is not a finger rig.
+        RobotRefused: If the rig refuses the connection, or is not a finger rig.
     """
 
     side_by_side: ClassVar[bool] = False
-    """Whether several can run at once: there is one rig, and a twin needs many processes."""
+    """Whether several envs can run at once: False, because there is only one rig."""
 
     def __init__(
         self,
@@ -130,16 +131,16 @@ class RigMixin(FingerEnv):
         """Start an episode; the options equal the simulated task's.
 
         Raises:
-            UnknownName: If there is no such option.
+            UnknownName: If the name of an option is unknown.
             FingerError: If a posture or a target is malformed or out of range.
             PathError: If a path is invalid, or the finger cannot follow it.
-            RobotRefused: If the rig was not armed in time, refuses the connection, stops on the way
-                to the start, or its lengths fit no posture.
-            LinkError: If it cannot be reached in time.
+            RobotRefused: If the rig was not armed in time, refuses the connection, or stops on the
+                way to the start, or if the lengths of its tendons fit no posture.
+            LinkError: If the rig cannot be reached in time.
         """
         self._seed = seed
         if self._own is not None and self._operator is not None:
-            for name in TENDONS:  # Cool the servos of its twin; servos of a rig cool in pauses.
+            for name in TENDONS:  # Resets the temperature of each servo of the twin.
                 self._operator.break_servo(name, "")
         observation, info = super().reset(seed=seed, options=options)
         return observation, self._with_rig(info)
@@ -162,12 +163,12 @@ class RigMixin(FingerEnv):
 
     @property
     def exclusive(self) -> bool:
-        """Return whether it blocks others from using the same robot; its own twin does not."""
+        """Return whether this env blocks other clients of the robot: not with its own twin."""
         return self._own is None
 
     @property
     def individual(self) -> str:
-        """Name of the argument that selects one finger of a gap; empty if there is only one."""
+        """Name of the argument that selects a finger of a gap, or "" if there is only one."""
         many = bool(self._twin) and self._twin != NOMINAL_TWIN
         return "finger_seed" if many and self._finger_seed is None else ""
 
@@ -218,7 +219,7 @@ class RigMixin(FingerEnv):
         self._command = command
         rig = self._rig_senses
         if rig.controls_length:
-            # The length at which the drive pulls with nothing but the least tension.
+            # Length at which the drive pulls with the least tension.
             still = self.drive.tension(command, np.zeros(len(TENDONS)), np.zeros(len(TENDONS)))
             return self._send(rig.length_values((rig.least - still) / self.drive.stiffness))
         lengths = cast("FingerSenses", self._senses).lengths
@@ -266,26 +267,26 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
 
     ## Action space
-    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`, so a script runs on both by changing the
-    id. Commands are converted to tensions here, by the newest lengths and speeds of the tendons at
-    the servos; one acts for 0.02 s.
+    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`, so a script runs on both envs if its id
+    is changed. The env converts commands to tensions, by the newest lengths and speeds of the
+    tendons at the servos. A command lasts 0.02 s.
 
     ## Observation space
-    `Box(-inf, inf, (38,), float64)`, the table of `Finger-v1`. On a rig with encoders at its
-    joints, as the shipped one, the angles are theirs, noise included, and velocities are their
-    differences over 20 ms, smoothed over 40 ms. Otherwise angles and velocities follow from lengths
-    and speeds with the nominal moment arms, and are as accurate as these. The fingertip follows
+    `Box(-inf, inf, (38,), float64)`, the table of `Finger-v1`. On a rig with encoders at its joints
+    the angles are measured, with noise, and velocities are differences of angles over 20 ms,
+    smoothed over 40 ms. Without encoders, angles and velocities are computed from lengths and
+    speeds of the tendons, and are as accurate as the nominal moment arms. The fingertip is computed
     from the angles.
 
     ## Reward
-    The formulas of `Finger-v1`. Distance, reward and `info["is_success"]` follow from the measured
-    angles; with its own twin (`twin`), from the true state.
+    The formulas of `Finger-v1`. Distance, reward and `info["is_success"]` are computed from the
+    measured angles, or from the true state of the env's own twin (`twin`).
 
     ## Start
-    The operator arms a rig; the env arms a twin. The finger is then brought close to the start of
-    `Finger-v1` for the same seed, which takes up to 1 s and ends within some hundredths of a radian
-    as measured, or farther off where gears stick; the target is the same. The servos of its own
-    twin are cool at the start; a rig's servos need pauses, or switch off by themselves.
+    The operator arms a rig; the env arms a twin. For up to 1 s, the env moves the finger to the
+    start of `Finger-v1` for the same seed. The measured error is a few hundredths of a radian, or
+    more if gears stick. The target is the same. Servos of the env's own twin are cool at the start;
+    servos of a rig need pauses, or switch off.
 
     ## End
     Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost
@@ -345,7 +346,7 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
         **rig: Arguments of `RigMixin`.
 
     Raises:
-        PathError: If it is not a path, or the nominal finger cannot follow it.
+        PathError: If `path` is not a path, or the nominal finger cannot follow it.
         UnknownName, LinkError, RobotRefused: As `RigMixin`.
     """
 
@@ -354,7 +355,7 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
 
 
 def _serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
-    """Serve the shipped profile on a twin with its own clock; a gap's finger has seed 0 or this."""
+    """Serve the package's finger profile on a twin with its own clock."""
     if twin not in ("", NOMINAL_TWIN, *GAPS):
         raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))
     if twin not in GAPS and finger_seed is not None:

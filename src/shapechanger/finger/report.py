@@ -29,8 +29,8 @@ _SHOWN: Final = {
     "N": ("N", 1.0),
     "1": ("of nominal", 1.0),
 }
-# Widest interval that says something, in SI units. Chosen: arms a finger's thickness; the others
-# about twice the range of the gap "wide".
+# Widest interval that counts as bounded, in SI units. It is the thickness of a finger for arms, and
+# about twice the range of the gap "wide" for the other parameters.
 _WIDEST: Final = {
     "moment_arms": 0.015,
     "tendon_friction": 3.0,
@@ -39,10 +39,10 @@ _WIDEST: Final = {
     "command_delay": 0.1,
     "strength": 0.6,
 }
-# The same for stiffness and damping of the joints, over the nominal value.
+# Widest bounded interval of stiffness and damping of the joints, divided by the nominal value.
 _WIDEST_OF_NOMINAL: Final = 3.0
 _INTERVAL: Final = "identified, 95 % interval"
-# m. The relative error of a shorter moment arm hardly matters.
+# Moment arm, m, below which the relative error hardly matters.
 _SMALL_ARM_M: Final = 2e-3
 
 
@@ -91,7 +91,7 @@ def number(estimate: ParameterEstimate, value: float) -> str:
 
 
 def interval(estimate: ParameterEstimate) -> str:
-    """Format the 95 % interval of a parameter; one that the log does not bound is unknown."""
+    """Format the 95 % interval of a parameter, or return "unknown" if it is unbounded."""
     low, high = number(estimate, estimate.low), number(estimate, estimate.high)
     return "unknown" if unbounded(estimate) else f"{low} to {high}"
 
@@ -103,7 +103,7 @@ def arm_cell(estimate: ParameterEstimate) -> str:
 
 
 def unbounded(estimate: ParameterEstimate) -> str:
-    """Reason why the log does not bound a parameter; empty if it does."""
+    """Return why the log does not bound a parameter, or "" if the log bounds it."""
     unit, factor = _SHOWN[estimate.unit]
     low, high = (f"{factor * end:.3g}" for end in (estimate.low, estimate.high))
     if math.isinf(estimate.low):

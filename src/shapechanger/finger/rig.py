@@ -1,4 +1,4 @@
-"""Convert measurements and commands of a finger rig to and from `Finger-v1`'s."""
+"""Conversion of a rig's measurements to those of `Finger-v1`, and of tensions to its commands."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from shapechanger.finger.task import FingerSenses, fingertip
 from shapechanger.finger.tensions import tensions_for_torque
 from shapechanger.layout import Layout
 
-# Length errors above this, m, come from a lost turn (30 mm on a small spool), not from arms.
+# Length error, m, above which a servo must have lost a turn (30 mm on a small spool).
 _MISFIT_M: Final = 0.012
-_COMPLIANCE: Final = 1.0 / 20e3  # m/N, of the cables, as of a twin's; chosen.
+_COMPLIANCE: Final = 1.0 / 20e3  # Assumed compliance of the cables, m/N, as on a twin.
 _ABOVE_REST: Final = 1e-3
 _QUANTITIES: Final = ("length", "speed", "tension")
 
@@ -25,18 +25,18 @@ _QUANTITIES: Final = ("length", "speed", "tension")
 class RigSenses:
     """Reads the state of a rig, and converts tensions to its commands.
 
-    With encoders at the joints, angles are theirs, and velocities are differences over one control
-    period, smoothed as in `FingerPlant` with noisy joints. Otherwise angles are the least-squares
-    fit of the seven lengths, corrected for the stretch of the tendons, with the nominal moment arms
-    and within the joints' ranges, and velocities follow from the speeds of the tendons.
+    With encoders at the joints, angles are measured, and velocities are smoothed differences over
+    one control period, as in `FingerPlant` with noisy joints. Otherwise angles are fitted to the
+    seven lengths by least squares, with corrections for stretch, the nominal moment arms and the
+    ranges of the joints, and velocities are computed from the speeds of the tendons.
 
     Attributes:
         most: Largest tension of each tendon, N, (7,).
         least: Tension of each tendon at command 0, N, (7,).
-        controls_length: Whether its commands are lengths, held with at most `most`.
+        controls_length: Whether commands are lengths, at tensions of at most `most`.
 
     Raises:
-        RobotRefused: If it has other tendons, or does not measure them.
+        RobotRefused: If the rig has other tendons, or does not measure them.
     """
 
     def __init__(self, robot: str, action_layout: Layout, state_layout: Layout) -> None:
@@ -70,7 +70,7 @@ class RigSenses:
         self._angles_of = np.linalg.pinv(-MOMENT_ARMS)
         self._state = np.zeros(state_layout.size)
         encoders = [f"{name}/angle" for name in JOINTS]
-        # Empty unless it has one at each joint.
+        # Indices of the encoders; empty unless each joint has an encoder.
         self._encoders = [self._starts[name] for name in encoders if name in self._starts]
         self._encoders = self._encoders if len(self._encoders) == len(JOINTS) else []
         self._differences = JointVelocities()
@@ -80,9 +80,9 @@ class RigSenses:
         self._differences.forget()
 
     def misfit(self, senses: FingerSenses) -> str:
-        """Return why the lengths fit no posture, with the worst tendon; empty if they do.
+        """Return why the lengths fit no posture, with the worst tendon, or "" if they fit one.
 
-        Lengths fit none with slack tendons, and after a servo has lost power and its turns.
+        Lengths fit no posture if tendons are slack, or if a servo lost power and so its turns.
         """
         longer = senses.lengths + _COMPLIANCE * senses.tensions + MOMENT_ARMS @ senses.angles
         worst = int(np.argmax(np.abs(longer)))
@@ -109,7 +109,7 @@ class RigSenses:
     def read(
         self, state: NDArray[Any], absent: tuple[str, ...], commands: NDArray[np.float64]
     ) -> FingerSenses:
-        """Convert one state of the rig; numbers that are `absent` now keep their last value."""
+        """Convert one state of the rig; numbers named in `absent` keep their last value."""
         missing = [self._starts[name] for name in absent if name in self._starts]
         fresh = np.array(state, np.float64)
         fresh[missing] = self._state[missing]
@@ -126,23 +126,23 @@ class RigSenses:
         return FingerSenses(angles, velocities, tensions, lengths, commands, fingertip(angles))
 
 
-# Tuned on the twin of the shipped rig. Rate at which the aim corrects an error of the posture, 1/s,
-# the largest error that counts, rad, and the length that is wound in further to keep taut, m.
+# For rigs that control lengths, tuned on a twin: the rate at which the aim corrects the posture,
+# 1/s, the limit of the error, rad, and the additional length that keeps tendons taut, m.
 _AIM_RATE: Final = 2.0
 _MOST_LAG_RAD: Final = 0.2
 _TAUT_M: Final = 0.5e-3
 
-# Tuned on a twin with geared servos, XL330-M077 on spools of 10 mm. Approach rate, 1/s, and speed
-# limit, rad/s; and gain of the speed controller, 1/s.
+# For rigs that control tensions, tuned on a twin with XL330-M077 servos and spools of 10 mm: the
+# approach rate, 1/s, the speed limit, rad/s, and the gain of the speed controller, 1/s.
 _RATE: Final = 8.0
 _MOST_SPEED: Final = 3.0
 _GAIN: Final = 30.0
-# Mass of rotor and gears at the tendon, kg: with spools of 10 mm tens of times the finger's.
+# Mass of rotor and gears at the tendon, kg.
 _GEARED_KG: Final = 1.44
 # Friction of the gears, N, and the tendon speed below which it is compensated partly, m/s.
 _GEAR_FRICTION_N: Final = 0.55
 _CREEP_M_PER_S: Final = 0.004
-# Integral gain, N·m per rad of lag, because friction and arms differ; and limit of the lag, rad/s.
+# Integral gain, N·m/rad, which corrects differences in friction and arms; and limit of lags, rad/s.
 _MORE_NM: Final = 0.08
 _MOST_LAG: Final = 0.8
 
@@ -173,7 +173,7 @@ class StartApproach:
         lag = speed - senses.velocities
         self._more += _MORE_NM * CONTROL_DT * np.clip(lag, -_MOST_LAG, _MOST_LAG)
         torque = self._held + self._inertia @ (_GAIN * lag) + self._more
-        # Gears resist winding in and hold when letting out: leave room for both.
+        # Gear friction acts in both directions, so the tensions keep a margin at both limits.
         least, most = rig.least + _GEAR_FRICTION_N, rig.most - _GEAR_FRICTION_N
         pull, _ = tensions_for_torque(MOMENT_ARMS, torque, least, most)
         creep = np.tanh(MOMENT_ARMS @ speed / _CREEP_M_PER_S)

@@ -32,16 +32,16 @@ POLICIES: Final = {
 
 
 def fingertip(angles: ArrayLike) -> NDArray[np.float64]:
-    """Return the place of the fingertip, m, shape (..., 3), at angles, rad, shape (..., 4)."""
+    """Return the position of the fingertip, m, shape (..., 3), at angles, rad, shape (..., 4)."""
     bent = directions(np.asarray(angles, np.float64))
     return np.stack(tip_at([np.cos(a) for a in bent], [np.sin(a) for a in bent]), axis=-1)
 
 
 def directions(angles: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the angles that place the fingertip, rad, of an array or a tensor of shape (..., 4).
+    """Return four angles, rad, from joint angles, an array or a tensor of shape (..., 4).
 
-    They are flexion and abduction of the knuckle, and the directions of the middle and the distal
-    phalanx from the proximal one, each of shape (...).
+    The four angles are flexion and abduction of the knuckle, and the directions of the middle and
+    the distal phalanx relative to the proximal one, each of shape (...).
     """
     return angles[..., 0], angles[..., 1], angles[..., 2], angles[..., 2] + angles[..., 3]
 
@@ -90,8 +90,8 @@ def _in_plane(cos: Sequence[Any], sin: Sequence[Any]) -> tuple[Any, Any]:
     return along, middle * sin[2] + distal * sin[3]
 
 
-# Distances at which the two halves of nearness have fallen by half: one guides the finger from
-# anywhere in its workspace of some ten centimetres, the other rewards the last millimetres.
+# Distances at which the two terms of nearness have fallen by half, m. The first term guides the
+# finger in its whole workspace of some ten centimetres; the second rewards the last millimetres.
 _FAR_M: Final = 0.020
 _NEAR_M: Final = 0.002
 
@@ -115,7 +115,7 @@ class FingertipReward:
         """Create the reward from weights that replace the defaults.
 
         Raises:
-            UnknownName: If there is no such weight.
+            UnknownName: If the name of a weight is unknown.
         """
         names = [field.name for field in fields(cls)]
         for name in weights:
@@ -154,7 +154,7 @@ class FingerSenses:
         tensions: Tendon tensions, N, (7,).
         lengths: Tendon lengths at their motors, relative to the straight finger, m, (7,).
         commands: The newest command, -1 to 1, (7,).
-        fingertip: Place of the fingertip by the angles, m, (3,).
+        fingertip: Position of the fingertip computed from `angles`, m, (3,).
     """
 
     angles: NDArray[np.float64]
@@ -174,8 +174,7 @@ class FingerSenses:
 def features_of_senses() -> list[Feature]:
     """Return a feature for each number of `FingerSenses.numbers`.
 
-    Ranges of angles are the anatomy's, and ranges of tensions end at the largest of the
-    nominal finger.
+    Angles have the ranges of the anatomy. Tensions range up to the nominal finger's largest ones.
     """
     joints = [(name, Element("joint", name)) for name in JOINTS]
     tendons = [(name, Element("tendon", name)) for name in TENDONS]
@@ -196,5 +195,5 @@ def features_of_senses() -> list[Feature]:
 
 
 def place_features(name: str, element: Element) -> list[Feature]:
-    """Return the three features of a place of an element, `name/x` to `name/z`, m."""
+    """Return the features `name/x`, `name/y` and `name/z`, m, of an element's position."""
     return [Feature(f"{name}/{axis}", "m", element=element) for axis in "xyz"]

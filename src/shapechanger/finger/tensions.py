@@ -1,4 +1,4 @@
-"""Tendon tensions: the drives that commands act through, and the tensions that hold a torque."""
+"""Tendon tensions: drives convert commands to tensions, a solver torques to tensions."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from shapechanger.finger.anatomy import (
 )
 from shapechanger.finger.parameters import FingerParameters
 
-# Stiffness and damping of an active muscle over its tension, 1/m and s/m. Both grow with tension,
-# as Cui, Perreault, Maas & Sandercock 2008 measured (J. Biomechanics 41:1945, PMC2488157). The size
-# is a slow stretch's rather than of the first millimetres, which are ten times as stiff: at
-# full flexion, 18 mm shorter than at rest, a flexor with fibres of 65 mm has about half of its
-# force left, as on the ascending limb of the force-length curve. The damping is chosen.
+# Stiffness and damping of an active muscle divided by its tension, 1/m and s/m. Both grow with
+# tension, as Cui, Perreault, Maas & Sandercock 2008 measured (J. Biomechanics 41:1945, PMC2488157).
+# The stiffness is for a slow stretch; the first millimetres are ten times as stiff. At full
+# flexion, 18 mm shorter than at rest, a flexor with fibres of 65 mm keeps about half of its force,
+# as on the ascending limb of the force-length curve. The damping is chosen.
 _MUSCLE_STIFFNESS: Final = 25.0
 _MUSCLE_DAMPING: Final = 1.0
-# Smallest share of its tension that a muscle is taken to have left.
+# Least strength of a shortened muscle that is assumed to compute its command.
 _WEAKEST: Final = 0.05
-# Gains of a servo that holds its spool. Chosen: 20 N, nearly its largest force, per centimetre.
+# Chosen gains of a servo that holds its spool: 20 N per centimetre, nearly its largest force.
 _SERVO_STIFFNESS: Final = 2000.0
 _SERVO_DAMPING: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class TendonDrive:
-    """Map from commands to tensions, which are clipped to the tendons' range.
+    """Map from commands to tensions.
 
     tension = (`offset` + `gain` u) (1 + `muscle_stiffness` (l - `rest`) + `muscle_damping` dl/dt)
-    + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1, and the tendon's length l beyond
-    the straight finger's, m. A drive of tensors instead of arrays maps tensors.
+    + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1, and the tendon's length l, m,
+    relative to the straight finger. The arrays may be tensors.
 
     Attributes:
         offset: Tension at rest, N, (7,).
         gain: Tension per command, N, (7,), > 0.
         stiffness: Stiffness, N/m.
         damping: Damping, N·s/m.
-        muscle_stiffness: Stiffness over tension, 1/m.
-        muscle_damping: Damping over tension, s/m.
+        muscle_stiffness: Stiffness divided by tension, 1/m.
+        muscle_damping: Damping divided by tension, s/m.
         rest: Length of each tendon at which a muscle has the tension of its command, m, (7,).
     """
 
@@ -66,7 +66,7 @@ class TendonDrive:
     ) -> NDArray[np.float64]:
         """Tensions, N, of a command, -1 to 1, at lengths, m, and their rates, m/s, (7,) each.
 
-        They are not clipped.
+        Tensions are not clipped to the range of the tendons.
         """
         pulled = self.stiffness * length + self.damping * speed
         return (self.offset + self.gain * command) * self._strength(length, speed) + pulled
@@ -76,10 +76,10 @@ class TendonDrive:
     ) -> NDArray[np.float64]:
         """Command that gives tensions, N, at lengths, m, and their rates, m/s, (7,) each.
 
-        It may lie outside -1 to 1.
+        The command may be outside of -1 to 1.
         """
         pulled = self.stiffness * length + self.damping * speed
-        # A muscle too short to pull has no such command; the largest is the nearest.
+        # No command makes a very short muscle pull, so its strength is at least `_WEAKEST`.
         strength = self._strength(length, speed).clip(_WEAKEST)
         return ((tension - pulled) / strength - self.offset) / self.gain
 
@@ -104,8 +104,8 @@ DRIVES: Final[Mapping[str, str]] = MappingProxyType(
 def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
     """Make the drive of a mode of action.
 
-    A drive is part of the controller: it takes the range of tensions from the finger, but uses the
-    nominal moment arms.
+    A drive is part of the controller: it uses the finger's range of tensions, but the nominal
+    moment arms.
 
     Raises:
         UnknownName: If the mode is unknown.
@@ -117,7 +117,7 @@ def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
         # The largest and smallest length of each tendon, from the ends of the joints' ranges.
         ends = -MOMENT_ARMS[:, :, None] * JOINT_RANGE[None]
         longest = ends.max(axis=2).sum(axis=1)
-        # The servo winds up below the shortest length, to have its full tension there.
+        # The servo aims below the shortest length, so that its tension there is the largest.
         shortest = ends.min(axis=2).sum(axis=1) - most / _SERVO_STIFFNESS
         half, middle = 0.5 * (longest - shortest), 0.5 * (longest + shortest)
         offset = LEAST_TENSION_N - _SERVO_STIFFNESS * middle
@@ -138,12 +138,12 @@ _NOTHING: Final = 1e-9
 def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
     """Smallest tensions, each at least 1, without torque about any joint; None if impossible.
 
-    Moment arms are in m, (tendons, joints), and tensions in multiples of the smallest. With moment
-    arms of full rank, every torque is then possible: a negative tension is made positive by adding
-    a multiple of them.
+    Moment arms are in m, (tendons, joints); tensions have any unit. If the tensions exist and the
+    moment arms have full rank, every torque is possible: adding a multiple of the tensions makes
+    all tensions of a solution positive.
     """
     r = np.asarray(arms, np.float64)
-    # Scaled to make the solver's tolerance a millionth of a typical arm.
+    # With this scale the solver's tolerance is a millionth of a typical arm.
     scale = np.abs(r).max()
     if not scale > 0.0:
         return None
@@ -172,7 +172,7 @@ def tensions_for_torque(
     r = np.asarray(arms, np.float64)
     low, high = (np.broadcast_to(np.asarray(b, np.float64), len(r)) for b in (least, most))
     wanted = np.asarray(torque, np.float64)
-    # In mN·m; the small weight of the tensions only chooses among those that give the torque.
+    # Torques are in mN·m. The small weight of the tensions selects among equivalent solutions.
     matrix = np.concatenate([r.T * 1e3, _LITTLE * np.eye(len(r))])
     goal = np.concatenate([(wanted - r.T @ low) * 1e3, np.zeros(len(r))])
     above = np.asarray(cast("Any", nnls(matrix, goal))[0])

@@ -22,7 +22,7 @@ from shapechanger.finger.visuals import polyline
 from shapechanger.layout import Element, Feature, Layout
 
 _CHECK_HZ: Final = 50.0
-# Checked time of an endless path, s.
+# Duration for which an endless path is checked, s.
 _LOOK_S: Final = 60.0
 # Largest error of a reachable point, m: a sixth of the tolerance of the task.
 _OFF_M: Final = 0.0005
@@ -45,9 +45,9 @@ def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
         k = len(angles)
         place = "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * points[k]))
         raise PathError(
-            f"The path leaves the finger's reach: at {times[k]:.2f} s it is at {place} mm, beyond "
-            "what the fingertip can reach. The knuckle is at (0, 0, 0); x points to the tip, y to "
-            "the thumb, z to the back."
+            f"The path leaves the finger's reach: at {times[k]:.2f} s the point {place} mm is out "
+            "of reach. The knuckle is at (0, 0, 0); x points to the tip, y to the thumb, z to the "
+            "back of the hand."
         )
     t, missing = _weakness(times, angles)
     if missing > 0.0:
@@ -81,7 +81,7 @@ def _weakness(times: NDArray[np.float64], angles: NDArray[np.float64]) -> tuple[
     return 0.0, 0.0
 
 
-# Ranges of random paths: radius, m, and speed, m/s, up to a circle of 12 mm once a second.
+# Ranges of random paths: radius, m, and speed, m/s.
 _SIZE: Final = (0.003, 0.015)
 _SPEED: Final = (0.01, 0.08)
 _SLOWEST_HZ: Final = 0.1
@@ -105,8 +105,7 @@ def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float
         else:
             make = circle if kind == 0 else figure_eight
             path = make(size, tuple(centre), hz, tuple(normal))
-        # The number of points does not depend on the speed: paths are smooth, and each reset
-        # draws one.
+        # Each reset draws a path, so the check is short; paths are smooth, so few points suffice.
         times = np.linspace(0.0, path.duration_s, _RANDOM_PATHS_LOOKS + 1)
         points = path.at(times)
         angles = _angles_along(points)
@@ -117,14 +116,14 @@ def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float
 PREVIEW_S: Final = (0.06, 0.12, 0.20)
 """Lookahead of the observation in addition to the end of the next step, s."""
 RANDOM: Final = "random"
-"""Value of `path` for another path at each reset."""
+"""Value of `path` to draw a path at each reset."""
 
 _TARGET: Final = Element("task", "target")
 SETTLING_STEPS: Final = 25
-"""Steps in which the fingertip reaches the path's speed, not counted in the error: 0.5 s."""
+"""Steps at the start that do not count for the error, 0.5 s: the fingertip has to gain speed."""
 FOLLOWS_M: Final = 0.003
 """Largest root mean square of the error of a finger that follows its path, m."""
-# Frames show this much of a path that does not end, s, and the trail of one second.
+# Frames show this duration of an endless path, s, and a trail of one second.
 _DRAWN_S: Final = 5.0
 _DRAWN_POINTS: Final = 97
 _TRAIL_STEPS: Final = 50
@@ -133,7 +132,7 @@ _TRAIL_M: Final = 0.0007
 _PATH_COLOUR: Final = (0.10, 0.55, 0.25, 1.0)
 _TRAIL_COLOUR: Final = (0.35, 0.20, 0.60, 1.0)
 SEEN_S: Final = np.array([0.0, CONTROL_DT, *PREVIEW_S])
-"""Times of the points that a step needs, s from now: the target, and those observed."""
+"""Times of the target and of the observed points, s from now."""
 
 
 class FingerTrackEnv(FingerEnv):
@@ -143,9 +142,9 @@ class FingerTrackEnv(FingerEnv):
     `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`.
 
     ## Observation space
-    `Box(-inf, inf, (47,), float64)`: the table of `Finger-v1`, whose target is the place of the
-    point at the end of the step; then the vectors from the fingertip to its places 0.06, 0.12 and
-    0.20 s from now, m:
+    `Box(-inf, inf, (47,), float64)`: the table of `Finger-v1` with the point at the end of the next
+    step as target; then the vectors, m, from the fingertip to the point 0.06, 0.12 and 0.20 s from
+    now:
 
     | Num   | Observation              | Min  | Max | Unit |
     | ----- | ------------------------ | ---- | --- | ---- |
@@ -158,17 +157,17 @@ class FingerTrackEnv(FingerEnv):
     + 0.5 / (1 + d / 0.002 m)) minus effort and change.
 
     ## Start
-    At rest, with the fingertip at a point of the path: a random one of a closed path, else its
-    beginning.
+    At rest, with the fingertip at a random point of a closed path, or at the beginning of an open
+    path.
 
     ## End
     Never terminated. Truncated after 250 steps, 5 s.
 
     ## Info
-    `distance`, m, of the true fingertip from the point; `rms`, m, its root mean square since 0.5 s
-    after the start; `is_success`, whether that is below 3 mm; `target`, m; `smoothness`,
-    `reward_nearness`, `reward_effort` and `reward_change`; `diverged` where the simulation
-    diverged.
+    `distance`, m, of the true fingertip from the point; `rms`, m, the root mean square of the
+    distance from 0.5 s after the start; `is_success`, whether `rms` is below 3 mm; `target`, m;
+    `smoothness`, `reward_nearness`, `reward_effort` and `reward_change`; `diverged` if the
+    simulation diverged.
 
     ## Versions
     v1: the first.
@@ -176,13 +175,12 @@ class FingerTrackEnv(FingerEnv):
     Args:
         path: A path of `shapechanger.finger.paths`; its name, "circle", "figure-eight", "line" or
             "curve", optionally with settings; a function of time; a CSV file of t, x, y and z; or
-            "random" for another one at each reset.
+            "random" to draw a path at each reset.
         **arguments: Arguments of `FingerEnv`.
 
     Raises:
-        PathError: If it is not a path, or the nominal finger cannot follow it; the message names
-            the place and the distance.
-        UnknownName: If there is no such path, or as in `FingerEnv`.
+        PathError: If `path` is not a path, or the nominal finger cannot follow it.
+        UnknownName: If the name of a path is unknown, or as in `FingerEnv`.
     """
 
     _options = ("posture", "path")
@@ -194,7 +192,7 @@ class FingerTrackEnv(FingerEnv):
         self._begin = require_reachable(self._path)
         self._t = 0.0
         self._look()
-        # Places of the fingertip, m, for frames.
+        # Positions of the fingertip in the last second, m, for frames.
         self._trail = deque([self.plant.fingertip], _TRAIL_STEPS)
         self._squares, self._steps = 0.0, 0
         ahead = ("target", *(f"ahead_{round(1e3 * s)}ms" for s in PREVIEW_S))
@@ -220,13 +218,13 @@ class FingerTrackEnv(FingerEnv):
         """Start an episode.
 
         Args:
-            seed: Seed of all randomness from here on; None keeps the present generator.
-            options: `path`, the path from here on; `posture`, four angles, rad, to start at
-                instead of those at the path.
+            seed: Seed of the env's random generator; None keeps the present generator.
+            options: `path`, the path of this and later episodes; `posture`, four start angles, rad;
+                by default the fingertip starts on the path.
 
         Raises:
-            UnknownName: If there is no such option or path.
-            PathError: If it is not a path, or the finger cannot follow it; the present one stays.
+            UnknownName: If the name of an option or path is unknown.
+            PathError: If `path` is invalid, or the finger cannot follow it; the env keeps its path.
             FingerError: If the posture is malformed or out of range.
         """
         super().reset(seed=seed)

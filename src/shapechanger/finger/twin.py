@@ -1,4 +1,4 @@
-"""World of a finger on a rig, the load of its servos' tendons."""
+"""Simulated finger that the servos of a rig's twin pull by its tendons."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from shapechanger.robot.drivers.servos.simulation import Rig
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.start import Place
 
-# N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
+# Chosen stiffness of a cable, N/m: a stretch of 1.25 mm at 25 N.
 _CABLE_STIFFNESS: Final = 20e3
-# kg, mass of the end of a cable: enough for steps of 1 ms to follow the cable's spring.
+# Mass of the end of a cable, kg, large enough to simulate the cable with steps of 1 ms.
 _CABLE_KG: Final = 0.010
 _MAX_STEP_S: Final = 0.001
 
@@ -31,8 +31,8 @@ _MAX_STEP_S: Final = 0.001
 def rig_place(profile: Profile, gap: str = "", seed: int | None = None) -> Place | None:
     """Return the place of a rig with the tendons of a finger; None for other robots.
 
-    The finger is drawn from the named reality gap, with seed 0 if none is given; without a gap it
-    is the nominal finger.
+    The finger is drawn from the named reality gap, by default with seed 0. Without a gap, it is the
+    nominal finger.
 
     Raises:
         RobotError: If a gap is given for another robot.
@@ -43,14 +43,14 @@ def rig_place(profile: Profile, gap: str = "", seed: int | None = None) -> Place
         return finger_place(resolve_gap(gap).draw(rng) if gap else NOMINAL)
     if gap:
         raise RobotError(
-            f"A --gap is between fingers, and {profile.name} has no servos for the tendons "
+            f"--gap must be used with a finger, but {profile.name} has no servos for the tendons "
             f"{', '.join(TENDONS)}."
         )
     return None
 
 
 def finger_place(parameters: FingerParameters) -> Place:
-    """Return the place of a rig that pulls a finger, which `open_finger` opens."""
+    """Return a place that `open_finger` opens, with a finger for the rig to pull."""
     return Place(f"{__name__}:{open_finger.__name__}", {"parameters": parameters.to_json()})
 
 
@@ -71,9 +71,9 @@ class FingerWorld(World):
 
     It has no surroundings and no other sensors.
 
-    The simulated servos bring motors, spools, gears and their friction. So friction, mass, lag and
-    delay of the parameters' drive are left out here, and the tendons stretch as the servos' cables.
-    The noise of the joints is their encoders'.
+    The twin simulates servos with motors, spools, gears, cables and friction. Friction, mass, lag
+    and delay of the parameters are therefore not simulated here. Readings of angles have the joint
+    noise of the parameters.
     """
 
     def __init__(self, parameters: FingerParameters, seed: int) -> None:
@@ -109,7 +109,7 @@ class FingerWorld(World):
         self._rig = rig
 
     def travels(self) -> Sequence[float]:
-        """Return how far each tendon's end is towards its spool, m; 0 for the straight finger."""
+        """Return the travel of each tendon towards its spool from the straight finger, m."""
         return (self._arms @ self._data.qpos)[self._order].tolist()
 
     def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
@@ -145,7 +145,7 @@ class FingerWorld(World):
         low, high = JOINT_RANGE.T
         posture = JOINT_REST + rng.uniform(-START_SPREAD, START_SPREAD, len(JOINTS))
         mujoco.mj_resetData(self._model, self._data)
-        # A separate generator, so that the number of readings does not change the starts.
+        # The noise has its own generator, so that the number of readings does not change starts.
         self._noise = np.random.default_rng([seed, 1])
         self._data.qpos[:] = np.clip(posture, low, high)
         mujoco.mj_forward(self._model, self._data)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 PORTRAITS_RAD: Final = tuple(
     math.radians(degrees) for degrees in (125.0, -125.0, 150.0, -150.0, 55.0, -55.0, 25.0, -25.0)
 )
-"""Directions of view of a portrait, rad from the heading: from ahead first, then from behind."""
+"""Directions of view for images from outside, rad from the heading, in order of preference."""
 
 _CAMERA: Final = "vehicle/camera"
 _CHASSIS: Final = "vehicle/chassis"
@@ -57,15 +57,15 @@ class MujocoWorld:
 
     Args:
         vehicle: Name of the vehicle, such as "car".
-        world: Kind of course, such as "corridor"; None for the vehicle's own (`HOME`).
+        world: Kind of course, such as "corridor"; None for the vehicle's default (`HOME`).
         seed: Seed of the course and of the first start.
         size: Width and height of the camera's images, pixels; None for no camera.
         pitch_deg: Angle of the camera's axis below the horizon, degrees; None for the vehicle's.
         fovy_deg: Vertical field of view of the camera, degrees; None for the vehicle's.
         look: Light and colours; None for the usual look of the world.
         lenses: Names of camera faults; see `shapechanger.vehicles.cameras.camera`.
-        coarse: Whether to take twice as long steps, but for a vehicle that turns on the spot, and
-            to let wheels meet only the ground. The hull, which is wider, meets the walls.
+        coarse: Whether to double the time step, except for a vehicle that turns on the spot, and
+            to ignore contacts of wheels with walls. The wider hull still touches walls.
 
     Attributes:
         vehicle: Model of the vehicle.
@@ -75,7 +75,7 @@ class MujocoWorld:
         lenses: Names of camera faults.
         model: Compiled MuJoCo model.
         data: State of the simulation.
-        placed: How often the vehicle was put somewhere, at a start or back on its path.
+        placed: Number of times that the vehicle was put at a start or back on its path.
         travelled_m: Distance that the wheels rolled, m; backward counts down.
 
     Raises:
@@ -99,7 +99,7 @@ class MujocoWorld:
         self.vehicle = vehicle_model(vehicle)
         self.mount = self.vehicle.camera.aimed(pitch_deg, fovy_deg)
         self._coarse = coarse
-        # With the longer step a tank, which skids when it turns, would turn a fifth less.
+        # With the longer step, a tank would turn a fifth less, because it skids in turns.
         self._step_s = _COARSE_DT if coarse and self.vehicle.turning_radius_m > 0.0 else SIM_DT
         self._world = HOME[vehicle] if world is None else world
         self.look: Look = Look.of(self._world) if look is None else look
@@ -318,8 +318,8 @@ class MujocoWorld:
             width: Width in pixels.
             height: Height in pixels.
             reach: Radius in view around the middle of the vehicle, m; None for its own reach.
-            azimuth_rad: Direction of view from its heading, counter-clockwise; 0 is from behind.
-                Of several, the first in which no wall hides the vehicle, if there is one.
+            azimuth_rad: Direction of view from the heading, counter-clockwise; 0 is from behind.
+                From several directions, the first in which no wall hides the vehicle is used.
             elevation_rad: Angle of view above the horizon; negative looks down.
         """
         if self._outside is None or self._outside.size != (width, height):

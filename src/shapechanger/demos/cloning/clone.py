@@ -25,7 +25,7 @@ _ROUNDING: Final = 1e-4  # Tolerance of actions in single precision.
 
 
 def _require(settings: Any, names: str, limits: str, fits: Callable[[float], bool]) -> None:
-    """Refuse the settings in `names` that have a value out of limits, or an empty tuple."""
+    """Raise an error if a setting in `names` is out of limits or an empty tuple."""
     for name in names.split():
         value: Any = getattr(settings, name)
         values: Any = value if hasattr(value, "__len__") else (value,)
@@ -70,7 +70,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         channels: Filters of each convolution; each one halves rows and columns.
         features: Number of features between image and actions.
         batch: Examples per step.
-        passes: Number of passes over the data, within the two bounds below.
+        passes: Number of passes over the data, within `fewest_steps` and `most_steps`.
         fewest_steps: Minimum number of steps.
         most_steps: Maximum number of steps.
         learning_rate: Initial learning rate; falls to 0 along half a cosine.
@@ -85,8 +85,8 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         eyes: Input of the first layer: "colours", or "edges": strength of the edges of each
             direction in each cell, which does not depend on light and colour.
         nerves: Widths of the layers for the state.
-        members: Number of averaged networks; each uses another stretch of time for early stopping,
-            so that together they learn from all data.
+        members: Number of averaged networks; each uses a different part of the data for early
+            stopping, so that together they learn from all data.
         dropout: Share of the features that are dropped in each step.
         smoothing: Label smoothing of classes.
         averaging: Decay of the exponential moving average of the weights; 0 for no average.
@@ -194,7 +194,7 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
 
 
 def first_row(height: int, framing: Framing) -> int:
-    """Return the first row that is not cut off; at least one is left."""
+    """Return the index of the first row after the crop, which keeps at least one row."""
     return min(round(height * framing.top), height - 1)
 
 

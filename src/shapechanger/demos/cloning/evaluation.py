@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 AskedHead = Literal["auto", "class", "regression"]
 """Requested kind of output; "auto" uses classes if few different actions were demonstrated."""
 
-_MOST_CLASSES: Final = 16  # More different actions are treated as continuous.
+_MOST_CLASSES: Final = 16  # Actions are continuous if there are more different ones.
 _MIN_REPEATS: Final = 4  # Average number of occurrences of each action for classes.
 # Maximum error of a value within the tolerance, as a share of half its range.
 _TOLERANCE: Final = 0.1
 _BINS: Final = 10
 _WORST: Final = 12
-_MAX_POINTS: Final = 2000  # Enough for a chart.
+_MAX_POINTS: Final = 2000  # Largest number of actions in a chart.
 _WORDS: Final = {
     "steering": ("left", "straight", "right"),
     "throttle": ("back", "still", "forward"),
@@ -188,7 +188,7 @@ def evaluate(policy: Clone, data: Dataset) -> EvaluationResult:
     predicted = policy.predict_many(data.pictures, data.states).astype(np.float64)
     layout, classes = data.action_layout, policy.net.classes
     apart = np.abs(predicted - target)
-    # Ranges of the driver alone: an absurd output would widen them, so that all others seem right.
+    # Ranges ignore the policy's outputs: an absurd output would make all others seem right.
     low, high = _ranges(target, layout)
     relative = apart / np.where(high > low, 0.5 * (high - low), 1.0)
     absurd, calibration, ece = None, (), None
@@ -211,7 +211,6 @@ def evaluate(policy: Clone, data: Dataset) -> EvaluationResult:
         wrongness = relative.max(axis=1)
     confusion = np.zeros((len(names), len(names)), np.int64)
     np.add.at(confusion, (truth, did), 1)
-    # Evenly spaced steps, in order.
     points = 0 if classes else min(len(target), _MAX_POINTS)
     shown = np.unique(np.linspace(0, len(target) - 1, points).round().astype(np.int64))
     return EvaluationResult(

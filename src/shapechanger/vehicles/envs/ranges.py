@@ -28,9 +28,9 @@ _BEARINGS: Final = np.radians(BEARINGS_DEG)
 COLLISION_REWARD: Final = -3.0
 """Reward of a collision: it costs three metres."""
 
-# Nearer to something than this costs, up to the second number for each second. Teachers keep this
-# distance without a price for it, but once nearer they squeezed through where a camera that sees 31
-# degrees to each side must guess; with it they brake and back out, and a student learns that too.
+# Distance below which the reward falls, m, and the largest cost, 1/s. Without the cost, teachers
+# squeezed through gaps that a camera with 31 degrees to each side does not show. With the cost,
+# teachers brake and back out, and a student learns this too.
 _NEAR_M, _NEAR_COST = 0.35, 3.0
 _LAYOUT: Final = Layout(
     (
@@ -45,7 +45,7 @@ _COURSES: Final = range(48)  # To train on. The models of this many stay compile
 class MeanOutputs:
     """Mean outputs of control periods, from rest, without sensors and the steps of outputs.
 
-    It leaves out deadlines, which a simulated command never misses, and stalls.
+    Stalls and deadlines are not simulated; a simulated command never misses a deadline.
     """
 
     def __init__(self, plan: GuardPlan) -> None:
@@ -72,7 +72,7 @@ class MeanOutputs:
         total = [0.0] * len(self._plan.outputs)
         left = ticks
         while left:
-            # Once at the target, the rest of the period is the same.
+            # After an output has reached its target, it is constant for the rest of the period.
             repeats = left if self._applied == target else 1
             left -= repeats
             values_now = output_values(self._plan, self._applied)
@@ -100,8 +100,8 @@ def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
 def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
     """Return steering and throttle, (2,), that move a standing vehicle unless the throttle is 0.
 
-    A teacher takes its mean action, and a mean throttle near 0 does not overcome static friction:
-    the vehicle would never move again. In training, exploration moved it.
+    A teacher drives by its mean action. A mean throttle near 0 does not overcome static friction,
+    so the vehicle would never move again; in training, exploration moved it.
     """
     steering, throttle = action
     if not stands or throttle == 0.0 or abs(throttle) >= LEAST_THROTTLE:
@@ -112,15 +112,15 @@ def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
 class RangesEnv(DriveEnv):
     """Drive fast without collisions, seeing distances all around the front.
 
-    The task, the vehicle and the courses of `shapechanger/Car-v1`, on the true state of the world:
-    a teacher that sees what no camera shows learns here in two minutes, and a student that sees
-    images learns from it (`shapechanger train Car --teacher ...`). The robot is not emulated, but
-    the arithmetic of its guard is: a step takes a sixth of the time or less, the tank's a third.
+    Task, vehicle and courses are the same as in `shapechanger/Car-v1`, but observations are the
+    true state of the world. A teacher is trained here in two minutes, and a student with a camera
+    learns from the teacher (`shapechanger train Car --teacher ...`). Only the arithmetic of the
+    robot's guard is simulated: a step takes a sixth of the time or less, or a third for the tank.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. It acts for one control period
-    of the profile, 1/20 s. Where the vehicle stands, a throttle other than 0 acts with a size of at
-    least 0.25, which moves it.
+    `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. An action lasts one control
+    period of the profile, 1/20 s. If the vehicle stands still, the size of a throttle other than 0
+    is raised to at least 0.25, which moves the vehicle.
 
     | Num | Action     | Min | Max | Unit |
     | --- | ---------- | --- | --- | ---- |
@@ -148,8 +148,8 @@ class RangesEnv(DriveEnv):
 
     ## Reward
     `DriveReward` with a metre of progress along the course for a metre forward, minus 3 for each
-    collision by default, and minus 1 for each second of standing. `reward_near` is minus up to 3
-    for each second nearer than 0.35 m to something, in proportion to what is missing of that.
+    collision by default, and minus 1 for each second of standing. `reward_near` is 0 at clearances
+    of 0.35 m and more, and falls linearly to -3 per second at contact.
 
     ## Start
     At a random place of a course that the seed draws, looking along it, at rest.
@@ -214,7 +214,7 @@ class RangesEnv(DriveEnv):
         self._progress_m = world.progress_m
         speed = (self._progress_m - progress) / self._period_s
         stands = abs(speed) < STANDING_MPS
-        # Without a price of standing, two of four teachers learned to stop in front of a wall.
+        # Without a cost of standing, two of four teachers learned to stop in front of a wall.
         terms = self._reward.terms(speed, collided, stands, self._period_s)
         if collided and self._puts_back:
             world.put_back()

@@ -16,7 +16,7 @@ from shapechanger.contract.limits import Duty, MotionReflexes, aimed, clipped, s
 from shapechanger.contract.plan import GuardPlan, OutputPlan, output_values
 from shapechanger.vehicles.world import MujocoWorld
 
-_STANDS_AFTER_S: Final = 0.5  # An encoder without an edge for this long stands.
+_STANDS_AFTER_S: Final = 0.5  # Time without an edge after which an encoder is still.
 _EDGES_PER_COUNT: Final = 4
 # HC-SR04: a ping at least every 60 ms takes 0.45 ms; without an echo it gives up after 38 ms.
 _CYCLE_NS: Final = 60_000_000
@@ -179,8 +179,8 @@ _COUNTS: Final = 4096  # Counts of its period.
 class SensedVehicle:
     """A vehicle with the limits and sensors of a robot, which starts at rest.
 
-    It is the robot without pins, chips, link and emergency stops: a robot's twin simulates
-    those, and drives to the same place.
+    Pins, chips, link and emergency stops are not simulated here. A robot's twin simulates them, and
+    drives to the same place.
 
     Args:
         plan: Plan of the guard.
@@ -191,7 +191,7 @@ class SensedVehicle:
         applied: Value of each action.
         reason: Why the vehicle does not follow its command; empty if it does.
         quantities: Readings and derived quantities, keyed by name.
-        sources: Name of the sensor behind each, or "estimated".
+        sources: Name of the sensor of each quantity, or "estimated", keyed by quantity.
     """
 
     def __init__(self, plan: GuardPlan, world: MujocoWorld) -> None:
@@ -255,7 +255,7 @@ class SensedVehicle:
     def _read(
         self, sensors: Sequence[tuple[str, _Read]], quantities: dict[str, float], direction: float
     ) -> None:
-        """Add readings, keyed by quantity; of two speeds the smaller."""
+        """Add readings, keyed by quantity; if two sensors measure speed, the smaller counts."""
         for name, read in sensors:
             for quantity, value in read(self.now_ns, direction).items():
                 if quantity == "speed" and abs(value) >= abs(quantities.get(quantity, math.inf)):
