@@ -23,7 +23,7 @@ SOLID_GROUP: Final = 3
 # Thickness of a wall behind its visible side, m: thinner than a partition, and more than a vehicle
 # moves in a step.
 _THICKNESS: Final = 0.06
-_WALL_FRICTION: Final = 0.3  # Friction of hulls on walls: a guess.
+_WALL_FRICTION: Final = 0.3  # Friction of hulls on walls, an estimate.
 # Texture of the ground and its sliding friction. That of rubber on dry concrete is 0.6 to 0.85
 # (Engineering Toolbox, "Friction and Friction Coefficients"); yards are dusty.
 _GROUND: Final = {

@@ -1,7 +1,7 @@
 """Surfaces of a course as meshes with precomputed light: ground, ceiling, walls and obstacles.
 
-A harbour also has quays with fittings, moored boats and a far shore, which are drawn only: but for
-tyres and ladders, which stand out of their wall by 2 cm at most, all of it is behind the walls.
+A harbour also has fittings on its quays, moored boats and a far shore, without collisions. They are
+behind the walls, except tyres and ladders, which stick out of walls by at most 2 cm.
 Obstacles, boats and fittings are the solids of `solids.obj`.
 """
 

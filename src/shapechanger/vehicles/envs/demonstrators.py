@@ -49,7 +49,7 @@ class Demonstrator:
         begin: Called at the beginning of an episode; returns the driver.
         seed: Seed of the mistakes.
         sway: Standard deviation of the wandering of the steering; jerks steer by up to three times
-            as much. None for what the vehicle can correct.
+            as much. None for the standard deviation that the vehicle can correct.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Demonstrator:
         self._action = self._begin()
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the driver's action, to learn from, and the disturbed one, to take, each (2,)."""
+        """Return the driver's action, to be learned, and the disturbed action to execute, (2,)."""
         action = self._action()
         # The exact discretization, for any period.
         keep = math.exp(-PERIOD_S / _WANDER_S)
@@ -84,7 +84,7 @@ class Demonstrator:
         return action, np.clip(action + noise, -1.0, 1.0).astype(np.float32)
 
     def _jerked(self) -> float:
-        """Steering of the current jerk; 0 without one."""
+        """Steering of the current jerk; 0 without a jerk."""
         self._jerk_s -= PERIOD_S
         if self._jerk_s <= 0:
             if self._rng.random() >= _JERKS_PER_S * PERIOD_S:
@@ -95,7 +95,7 @@ class Demonstrator:
 
 
 def require_rate(control_hz: float) -> None:
-    """Check that a robot takes an action when an expert chooses one."""
+    """Raise a ProfileError unless a robot has the control rate of the experts."""
     if not math.isclose(control_hz * PERIOD_S, 1.0):
         raise ProfileError(
             f"This robot has control_hz = {control_hz:g}, and the experts that demonstrate driving "

@@ -1,4 +1,4 @@
-"""The driving task on a simulated course: what all views of it share."""
+"""The driving task on a simulated course: the base class of the envs for vehicles."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _MAX_PIXELS: Final = 1920  # Limit of a profile.
 
 
 class SimulatedRobot(msgspec.Struct, frozen=True):
-    """Numbers of a robot's profile that its simulation and recordings of it need.
+    """The part of a robot's profile that its simulation and recordings need.
 
     Attributes:
         robot: Name of the robot.
@@ -55,9 +55,9 @@ class SimulatedRobot(msgspec.Struct, frozen=True):
         plan: Actions, outputs, sensors and limits.
         control_hz: Actions per second.
         reward: Weights of the task.
-        action_layout: Layout of its actions.
-        state_layout: Layout of its state.
-        size: Width and height of its camera's frames, pixels; (0, 0) without a camera.
+        action_layout: Layout of the actions.
+        state_layout: Layout of the state.
+        size: Width and height of the camera's frames, pixels; (0, 0) without a camera.
         camera_pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
         camera_fovy_deg: Vertical field of view, degrees; None if unknown.
     """
@@ -97,12 +97,12 @@ def simulated_robot(
     Args:
         vehicle: Name of the vehicle.
         robot: Path or name of its profile; None for `lab-` followed by the vehicle.
-        size: Replaces the width and height of its frames, pixels; None to keep them.
-        steering: Replaces the profile's steering; None to keep it.
+        size: Width and height of frames, pixels; None for the profile's size.
+        steering: Steering that replaces the profile's; None for the profile's steering.
 
     Raises:
-        UnknownName: If there is no such vehicle, profile or steering.
-        ProfileError: If it is not the profile of this vehicle with a camera.
+        UnknownName: If the name of the vehicle, profile or steering is unknown.
+        ProfileError: If the profile is for another vehicle, or has no camera.
         SpaceMismatch: If the size is out of range.
     """
     vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
@@ -170,7 +170,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     world: MujocoWorld
 
     def __new__(cls, *arguments: Any, **options: Any) -> Self:
-        """Keep the arguments, with which a copy is pickled."""
+        """Store the arguments for pickling."""
         env = super().__new__(cls)
         EzPickle.__init__(env, *arguments, **options)
         return env
@@ -223,9 +223,9 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
                 ones are sampled.
 
         Raises:
-            UnknownName: If there is no such option.
-            WorldError: If a seed is not a whole number from 0, or the vehicle touches something at
-                the start.
+            UnknownName: If the name of an option is unknown.
+            WorldError: If a seed is not a whole number of at least 0, or the vehicle touches
+                something at the start.
         """
         super().reset(seed=seed)
         options = options or {}
@@ -297,7 +297,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             seed: Seed of the mistakes.
 
         Raises:
-            ProfileError: If the robot has another control rate than the expert.
+            ProfileError: If the control rates of the robot and of the expert differ.
         """
         from shapechanger.vehicles.envs.demonstrators import Demonstrator  # SciPy.
 
