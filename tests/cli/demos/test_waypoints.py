@@ -165,9 +165,9 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
     ("changes", "why"),
     [
         ({"camera_pitch_deg": None}, "does not state pitch and field of view .* give --camera"),
-        ({"camera_fovy_deg": 0.0}, "from 0 to 180, got 0 and 0"),
+        ({"camera_fovy_deg": 0.0}, "above 0 and below 180, got 0 and 0"),
         ({"camera_fovy_deg": 20.0}, "misses"),
-        ({"action_layout": ACTION_LAYOUT}, "leave out --waypoints"),
+        ({"action_layout": ACTION_LAYOUT}, "omit --waypoints"),
         (
             {"action_layout": Layout((Feature("left", "1"), Feature("right", "1")))},
             "have the actions left, right",
@@ -204,7 +204,7 @@ def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
         DemosTrain(data, out, camera=(0.0, 48.8)).run()
     with pytest.raises(DemosError, match="leave out --head and --inputs"):
         DemosTrain(data, out, waypoints=True, inputs="state").run()
-    with pytest.raises(WorldError, match="from 0 to 180, got 95 and 48"):
+    with pytest.raises(WorldError, match="above 0 and below 180, got 95 and 48"):
         DemosTrain(data, out, waypoints=True, camera=(95.0, 48.0)).run()
 
 

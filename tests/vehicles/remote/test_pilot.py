@@ -47,8 +47,8 @@ def test_policies_that_fit() -> None:
 @pytest.mark.parametrize(
     ("card", "robot", "text"),
     [
-        (clone_card(body="tank"), _CAR, "learned to steer a tank, and lab-car is a car"),
-        (clone_card(control_hz=10.0), _CAR, "10 actions a second, and lab-car has control_hz = 20"),
+        (clone_card(body="tank"), _CAR, "learned to steer a tank, but lab-car is a car"),
+        (clone_card(control_hz=10.0), _CAR, "10 actions a second, but lab-car has control_hz = 20"),
         (_CLONE, replace(_CAR, image_size=None), "lab-car has no camera"),
         (_CLONE, replace(_CAR, action_layout=ACTION_LAYOUT.to_json()), "those required here are"),
         (_WAYPOINTS, replace(_CAR, camera_pitch_deg=None), "pitch_deg and fovy_deg"),
@@ -73,7 +73,7 @@ def student(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("profile", "name", "text"),
     [
-        ("lab-tank", "student.onnx", "learned to steer a car, and lab-tank is a tank"),
+        ("lab-tank", "student.onnx", "learned to steer a car, but lab-tank is a tank"),
         ("lab-car", "studnt.onnx", "student.onnx?"),
         ("lab-car", "student.safetensors", "policies export"),
         ("lab-car", "", "There is no policy NAME.onnx"),
