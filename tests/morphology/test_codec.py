@@ -68,8 +68,8 @@ def test_unknown_kinds_and_fields_are_refused(kind: object) -> None:
         ({"edit": "stretch", "body": 3, "factor": 2}, "stretch: Expected `str`, got `int`"),
         ({"edit": "stretch", "body": "shin", "factor": 2, "axis": "w"}, "stretch: .*'w'"),
         ({"edit": "gravity", "to": [0, -9.81]}, "gravity: Expected `array` of length 3"),
-        ({"edit": "gravity", "to": [0, 0, -300]}, "gravity: Gravity is at most 250"),
-        ({"edit": "mass", "element": "*"}, "mass: Mass takes either scale or to"),
+        ({"edit": "gravity", "to": [0, 0, -300]}, "gravity: Gravity must be at most 250"),
+        ({"edit": "mass", "element": "*"}, "mass: Mass needs either scale or to"),
     ],
 )
 def test_invalid_fields_are_refused(fields: dict[str, Any], message: str) -> None:

@@ -1,4 +1,4 @@
-"""Bodies as values: edits of a model, their JSON, those between two, and families of them.
+"""Bodies as values: edits of a model, their JSON, interpolated bodies, and families of bodies.
 
 >>> from shapechanger.morphology import Stretch, to_json
 >>> to_json([Stretch("*shank*", 1.5)])
@@ -30,8 +30,8 @@ from shapechanger.morphology.spec.carried import carried
 Body = tuple[Edit, ...]
 """The edits, in order, that make a body from the model of its family."""
 
-# MuJoCo takes sparse constraint Jacobians from 60 degrees of freedom on. Newton's solver of this
-# version then factorises a wrong Hessian, which 4.0.1 mends (google-deepmind/mujoco#3767).
+# MuJoCo uses sparse constraint Jacobians from 60 degrees of freedom on. Newton's solver of this
+# version then factorises a wrong Hessian; 4.0.1 fixes this (google-deepmind/mujoco#3767).
 _WRONG_SPARSE: Final = "4.0.0"
 _WITH_PART: Final = 0.5  # Share of the training bodies that have one of the family's parts.
 
@@ -60,7 +60,7 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
     """Return a body from one edit, several, or their JSON, which may be parsed already.
 
     Raises:
-        UnknownName: As of `from_json`.
+        UnknownName: As for `from_json`.
         MorphologyError: If `value` is something else.
     """
     if isinstance(value, str):
@@ -95,10 +95,10 @@ def interpolate(a: Body, b: Body, alpha: float) -> Body:
     """Return a body on the way from `a` to `b`.
 
     Both ends are exact: 0 returns `a` itself, 1 returns `b` itself. Physical quantities are
-    continuous in `alpha`, except the inertia of a segment that is split, which jumps by that of the
-    rounded ends of its parts. Dimensions cannot be continuous: a limb or motor that only `b` has
-    exists, small and weak, for every `alpha` above 0, and one that only `a` has, ever smaller, for
-    every `alpha` below 1.
+    continuous in `alpha`, except the inertia of a segment that is split, which jumps by the inertia
+    of the rounded ends of its parts. Dimensions cannot be continuous: a limb or motor that only `b`
+    has exists, small and weak, for every `alpha` above 0; a limb or motor that only `a` has exists
+    for every `alpha` below 1, and shrinks as `alpha` grows.
 
     Args:
         a: Body at 0.
@@ -127,7 +127,7 @@ def interpolate(a: Body, b: Body, alpha: float) -> Body:
 def _key(edit: Edit) -> Hashable:
     """Return what two edits must share to be interpolated: everything but their numbers.
 
-    A motor that only one of two has exists between them, with a gear that fades to zero.
+    If only one edit has a motor, the edits between them have one with a gear that fades to zero.
     """
     values: dict[str, Any] = msgspec.structs.asdict(edit)
     return type(edit), tuple(
@@ -172,7 +172,7 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
     """Compile a copy of a specification with edits applied in order.
 
     Raises:
-        MorphologyError: As of `reshape`; a `BrokenModel` if MuJoCo does not compile the result.
+        MorphologyError: As for `reshape`; a `BrokenModel` if MuJoCo does not compile the result.
     """
     body = tuple(edits)
     try:
@@ -188,7 +188,7 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
 
 
 def reason_of(error: BaseException) -> str:
-    """Return the message of an error of MuJoCo, which may have several lines, for a sentence."""
+    """Return the message of an error of MuJoCo in one line, to be quoted in a sentence."""
     lines = [" ".join(line.split()) for line in str(error).splitlines()]
     return "; ".join(filter(None, lines)).removeprefix("Error: ").removesuffix(".")
 
@@ -205,8 +205,8 @@ class Axis:
     """A number by which the bodies of a family differ.
 
     Attributes:
-        name: Its name, such as "length of shank_4".
-        edit: Makes the edit of a value.
+        name: Name of the number, such as "length of shank_4".
+        edit: Function from a value of the number to the edit that sets it.
         low: Smallest value of the training bodies.
         high: Largest value of the training bodies.
         lowest: Smallest value of all bodies.
@@ -257,7 +257,7 @@ class Family:
         return reshape(spec, self.rig) if self.rig else spec
 
     def body(self, value: BodyLike) -> Body:
-        """Edits of a body.
+        """Return the edits of a body.
 
         Args:
             value: Name of a body of this family, edits as JSON, one edit, or several.
@@ -276,7 +276,7 @@ class Family:
         return known[name]
 
     def body_at(self, values: Mapping[str, float], parts: Mapping[str, str] | None = None) -> Body:
-        """Return the body at some values of the family's axes, by their names; the others are 1.
+        """Return the body with some values of the family's axes; the other axes are unedited.
 
         Args:
             values: Value of each axis, by its name.
@@ -301,7 +301,7 @@ class Family:
         return tuple(edits)
 
     def sample(self, n: int, seed: int = 0, split: Split = "train") -> list[Body]:
-        """Draw bodies; the first ones do not depend on the number.
+        """Draw bodies; a larger `n` adds bodies after the same first ones.
 
         - "train": each axis within its training range, drawn uniformly in its logarithm, and in
           half of the bodies one part.
@@ -352,7 +352,8 @@ class Family:
 def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, ...]:
     """Return an axis for the length of each of these bodies.
 
-    In training it is `low` to `high` times the model's; of all, 0.3 below to 0.4 above these.
+    The training range is `low` to `high` times the model's length. The whole range begins 0.3 lower
+    and ends 0.4 higher.
     """
     return tuple(
         Axis(f"length of {body}", partial(Stretch, body), low, high, low - 0.3, high + 0.4)

@@ -1,7 +1,7 @@
 """The robot in a model and the poses that follow from it: limits, feet on the floor, height.
 
-A file may hold a robot and objects, in any order. Trunk, standing height, mass, start poses and
-limbs are the robot's: of all that its actuators move, directly or by a coupling.
+A file may contain a robot and objects, in any order. Trunk, standing height, mass, start poses and
+limbs describe the robot: all bodies that the actuators move, directly or by a coupling.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFI
 # A joint starts at least this share of its range inside its limits, because the spring of a limit
 # pushes at the limit itself.
 _INSIDE: Final = 0.1
-_FAR_M: Final = 1000.0  # Distance within which a floor is searched; a higher body has none.
-_LOCKED: Final = 1e5  # A damping that slows a joint by more than this factor a step locks it.
+_FAR_M: Final = 1000.0  # Largest distance at which a floor is searched.
+_LOCKED: Final = 1e5  # A joint is locked if damping slows it by more than this factor per step.
 _VERTICAL: Final = 1e-6  # Tolerance of the vertical part of an axis that counts as vertical.
-_MOST_STEPS: Final = 40  # Towards each start pose.
+_MOST_STEPS: Final = 40  # Largest number of steps to close the loops of a start pose.
 _START_CLOSED: Final = 1e-4  # Largest violation of a start pose, m or rad.
-_SHARES: Final = (0.5, 0.25, 0.125)  # Of a drawn deviation, tried until one can be closed.
-# Deviations from a drawn pose, rad or m, that are tried where the file's own pose is outside its
-# limits: steps get stuck at a stretched arm. Of Metaworld's Sawyer one in ten ends closed.
+_SHARES: Final = (0.5, 0.25, 0.125)  # Shares of a drawn deviation, tried until the loops close.
+# If the file's own pose is outside its limits, random deviations from the drawn pose are tried, of
+# this size, rad or m, and this many: steps get stuck at a stretched arm. One in ten tries closes
+# the loop of Metaworld's Sawyer.
 _BEND: Final = 0.6
 _MOST_BENDS: Final = 40
 
@@ -41,9 +42,9 @@ def robot_bodies(model: mujoco.MjModel) -> NDArray[np.bool_]:
     """Return whether each body is part of the robot, shape (nbody,).
 
     The robot is every kinematic tree that an actuator moves, through a joint, tendon, site or body;
-    every tree that an active equality couples to one of these, as the second finger of a gripper or
-    a link of a closed loop; and the fixed bodies that carry them. In a model without actuators it
-    is everything. The world is never part of it.
+    every tree that an active equality couples to one of these, such as the second finger of a
+    gripper or a link of a closed loop; and the fixed bodies that carry these trees. In a model
+    without actuators the robot is all bodies. The world is never part of it.
     """
     trees, of_tree = moved_trees(model), model.body_treeid
     roots = model.body_rootid[np.isin(of_tree, trees)]
@@ -68,7 +69,7 @@ def moved_trees(model: mujoco.MjModel) -> list[int]:
     found["tendons"] = [set[int]().union(*wraps[at : at + n]) for at, n in paths]
 
     def trees(kind: str, *ends: int) -> set[int]:
-        known = found.get(kind, [])  # None of a flex.
+        known = found.get(kind, [])  # A flex has no entry.
         return set[int]().union(*(known[at] for at in ends if at >= 0 and known)) - {-1}
 
     pulled = zip(kinds["actuator_target_kinds"], model.actuator_trnid.tolist(), strict=True)
@@ -76,7 +77,7 @@ def moved_trees(model: mujoco.MjModel) -> list[int]:
         moved.update(trees(kind, *(ends if kind == "sites" else ends[:1])))
     pairs = zip(kinds["eq_kinds"], model.eq_obj1id.tolist(), model.eq_obj2id.tolist(), strict=True)
     coupled = [trees(*pair) for pair, on in zip(pairs, model.eq_active0, strict=True) if on]
-    for _ in everything:  # Joints that an equality couples count without an actuator.
+    for _ in everything:  # Trees that an equality couples to a moved tree count as moved.
         for tied in coupled:
             if not tied.isdisjoint(moved):
                 moved.update(dict.fromkeys(tied, 0))
@@ -105,16 +106,16 @@ class Lift(NamedTuple):
         return float(self.at_zero_m + self.up * pose[self.place])
 
     def number_at(self, height_m: float) -> float:
-        """Return the value at which the trunk's origin is this high."""
+        """Return the coordinate's value at which the trunk's origin is this high."""
         return self.up * (height_m - self.at_zero_m)
 
 
 def travelling_body(model: mujoco.MjModel) -> int | None:
-    """Return the index of the body that can go anywhere; None without one.
+    """Return the index of the robot's body that can travel; None if no body can.
 
-    It has the robot's free joint or, without one, its first slide without limits on a body on the
-    world, as of runners in a plane. Free objects are not the robot, see `robot_bodies`; of several
-    free robots it is the one that most actuators move.
+    This is the body with the robot's free joint or, if it has none, the body on the world with its
+    first slide without limits, as in runners in a plane. Free objects are not part of the robot,
+    see `robot_bodies`. Of several free robots, the one that most actuators move is used.
     """
     joints = _travelling_joints(model)
     return int(model.jnt_bodyid[joints[0]]) if joints else None
@@ -123,8 +124,8 @@ def travelling_body(model: mujoco.MjModel) -> int | None:
 def trunk_lift(model: mujoco.MjModel) -> Lift | None:
     """Return the coordinate that raises the trunk; None for a body that cannot be raised.
 
-    It has the robot's free joint or, without one, of its first vertical slide without limits
-    on a body on the world. A slide with limits is a hoist, which does not stand.
+    It belongs to the robot's free joint or, if it has none, to its first vertical slide without
+    limits on a body on the world. A slide with limits is a hoist, and its body does not stand.
     """
     for joint in _travelling_joints(model):
         place, body, axis = int(model.jnt_qposadr[joint]), model.jnt_bodyid[joint], np.zeros(3)
@@ -139,7 +140,7 @@ def trunk_lift(model: mujoco.MjModel) -> Lift | None:
 
 
 def _moving_dofs(model: mujoco.MjModel) -> NDArray[np.bool_]:
-    # Files lock a joint with a damping of 1e11, and MuJoCo diverges unless it is at rest.
+    # Some files lock a joint with a damping of 1e11; MuJoCo diverges unless the joint is at rest.
     return model.dof_damping * model.opt.timestep <= _LOCKED * model.dof_M0
 
 
@@ -227,8 +228,8 @@ class StartRules:
     Attributes:
         lift: The coordinate that raises the trunk; see `trunk_lift`.
         limited_places: Indices in qpos of the robot's hinges and slides with limits.
-        lowest: Their lower limits, rad or m.
-        highest: Their upper limits, rad or m.
+        lowest: Lower limits of these joints, rad or m.
+        highest: Upper limits of these joints, rad or m.
         floor_pairs: Each floor with each geom of the robot that it can touch.
     """
 
@@ -236,7 +237,7 @@ class StartRules:
         self.lift = trunk_lift(model)
         self._model = model
         limited = (model.jnt_type > int(_J.mjJNT_BALL)) & (model.jnt_limited != 0)
-        # A single tree is the robot; runners read these rules at each reset.
+        # A single tree is the robot: runners read these rules at each reset, so save the search.
         self._robot = robot_bodies(model) if model.ntree > 1 else np.arange(model.nbody) > 0
         joints = np.flatnonzero(limited & self._robot[model.jnt_bodyid])
         self.lowest, self.highest = model.jnt_range[joints].T
@@ -266,7 +267,7 @@ class StartRules:
     def keep_within_limits(self, pose: _Array, inside: float = 0.0) -> _Array:
         """Return a pose, shape (nq,), with the robot's hinges and slides moved inside their limits.
 
-        They keep the share `inside` of their range from the limits.
+        Their distance from the limits is at least the share `inside` of their range.
         """
         result, margin = pose.copy(), inside * (self.highest - self.lowest)
         low, high = self.lowest + margin, self.highest - margin
@@ -278,7 +279,8 @@ class StartRules:
         """Return the clearance of the robot's lowest point above the floor, m; negative inside it.
 
         The floor is every plane and height field that is fixed to the world and can touch the
-        robot's geoms; 1000 without one. The model's `data` have gone through `mj_kinematics`.
+        robot's geoms. Without a floor, 1000 is returned. `data` must be up to date with
+        `mj_kinematics`.
         """
         gaps = (
             mujoco.mj_geomDistance(self._model, data, floor, geom, _FAR_M, None)
@@ -302,7 +304,7 @@ class StartRules:
             pose = self._closed(pose, start, goal, data)
             lifted = pose.copy()
             self._lift(lifted, data)
-            # A robot that a weld or a rope holds hangs there, and does not stand.
+            # Do not lift a robot that hangs on a weld or a rope.
             if self._violation(lifted, data) <= goal:
                 pose = lifted
         return pose
@@ -329,7 +331,7 @@ class StartRules:
         return largest(equality_rows(self._model, data)[1])
 
     def _closed(self, drawn: _Array, start: _Array, goal: float, data: mujoco.MjData) -> _Array:
-        """Return the pose next to a drawn one, inside the limits, with no larger violation."""
+        """Return a pose near a drawn one that violates the equalities by `goal` or the least."""
         is_inside = bool(np.all(start == self.keep_within_limits(start)))
         best, least = start.copy() if is_inside else drawn, np.inf
         for pose in self._tries(drawn, start, is_inside):
@@ -342,7 +344,7 @@ class StartRules:
         return best
 
     def _tries(self, drawn: _Array, start: _Array, is_inside: bool) -> Iterator[_Array]:
-        """Yield the drawn pose, nearer ones, and of a start outside the limits others around it."""
+        """Yield the drawn pose, poses nearer to the start and, if needed, random ones around it."""
         yield drawn
         deviation, rng = np.zeros(self._model.nv), np.random.default_rng(0)
         mujoco.mj_differentiatePos(self._model, deviation, 1.0, start, drawn)

@@ -27,10 +27,10 @@ _EQUAL: Final = 1e-6  # Moments that differ by a smaller share are equal.
 LIMB_NUMBERS: Final = (
     *("joint x", "joint y", "joint z", "distance"),  # From the trunk's origin: direction, and m.
     *("axis x", "axis y", "axis z"),
-    *("end x", "end y", "end z", "length"),  # From the joint to the limb's farthest end: the same.
+    *("end x", "end y", "end z", "length"),  # From joint to farthest end: direction, and m.
     *("mass", "mass with limbs"),  # Decades above 1 kg.
     *("start", "lower", "upper"),  # Start and limits of the joint, rad or m; 0 without limits.
-    *("strength", "damping", "armature"),  # Decades, so that each is about 1.
+    *("strength", "damping", "armature"),  # Logarithms, so that each is about 1.
     *("limited", "slides", "depth"),
 )
 """Meaning of the numbers of a limb; vectors are in the trunk's frame, in the start pose.
@@ -47,13 +47,13 @@ class Limb(msgspec.Struct, frozen=True):
     """One joint, and the segment that it moves up to the next joint.
 
     Attributes:
-        joint: Name of its hinge or slide.
-        bodies: Names of its body and of those fixed to it; none if another joint of the same body
-            has them.
-        actuator: Name of the actuator that moves the joint; empty without one. One of a
-            tendon, site or body counts for the joint that it turns most in the start pose, of those
-            without an actuator yet; of equal ones, for the nearest to the trunk.
-        numbers: Its description, see `LIMB_NUMBERS`.
+        joint: Name of the hinge or slide.
+        bodies: Names of the body that the joint moves and of bodies fixed to it; empty if a later
+            joint of the same body lists them.
+        actuator: Name of the actuator that moves the joint, or "". An actuator of
+            a tendon, site or body is assigned to the joint that it turns most in the start pose, of
+            all joints without an actuator; of equal joints, to the one nearest to the trunk.
+        numbers: Description of the limb, see `LIMB_NUMBERS`.
     """
 
     joint: str
@@ -66,8 +66,8 @@ class Tree(msgspec.Struct, frozen=True):
     """A trunk and its limbs.
 
     Attributes:
-        trunk: Names of the trunk's body and of bodies fixed to it; of the world if the body cannot
-            travel.
+        trunk: Names of the trunk's body and of bodies fixed to it; the trunk of a robot that cannot
+            travel is the world.
         numbers: Description of the trunk, see `TRUNK_NUMBERS`.
         limbs: Its limbs, each after the limb that carries it.
         trunk_numbers: Names of the numbers of the trunk.
@@ -133,7 +133,7 @@ def _moments(model: mujoco.MjModel, data: mujoco.MjData) -> _Array:
 def _force(model: mujoco.MjModel, actuator: int) -> float:
     """Return the force of an actuator for a control of 1, N or N·m.
 
-    A muscle has a peak force; a negative one is derived from a scale and the inertia that it moves.
+    A negative peak force of a muscle is derived from its scale and the inertia that it moves.
     """
     gain = model.actuator_gainprm[actuator]
     if model.actuator_gaintype[actuator] != mujoco.mjtGain.mjGAIN_MUSCLE:
@@ -195,13 +195,13 @@ def _actuators_by_joint(
 def _farthest(
     model: mujoco.MjModel, data: mujoco.MjData, bodies: list[int], point: _Array
 ) -> tuple[_Array, float]:
-    """Return the farthest end of some bodies' geoms from a point: the way there, and its length."""
+    """Return the vector from a point to the farthest end of some bodies' geoms, and its length."""
     way, length = np.zeros(3), 0.0
     for geom in np.flatnonzero(np.isin(model.geom_bodyid, bodies)):
         kind = int(model.geom_type[geom])
         if kind in GROUND:
             continue
-        # Capsules and cylinders end on their own z axis; others are as long as their bound.
+        # Capsules and cylinders end on their own z axis; other shapes at their bounding sphere.
         half = data.geom_xmat[geom].reshape(3, 3)[:, 2] * model.geom_size[geom, 1] * (kind in _LONG)
         more = 0.0 if kind in _LONG else float(model.geom_rbound[geom])
         for side in (1.0, -1.0):

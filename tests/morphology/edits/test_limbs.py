@@ -159,7 +159,9 @@ def test_a_body_without_hinge_needs_an_axis() -> None:
         """<mujoco><worldbody><body name="b"><freejoint/><geom name="g" type="capsule"
         size=".1 .2"/></body></worldbody></mujoco>"""
     )
-    with pytest.raises(MorphologyError, match="'b' has no hinge to take the axis from: give one"):
+    with pytest.raises(
+        MorphologyError, match="'b' has no hinge whose axis can be used: give an axis"
+    ):
         built(spec, AddSegment("b", "tail", (0.0, 0.0, 1.0)))
     model = built(spec, AddSegment("b", "tail", (0.0, 0.0, 1.0), axis=(1.0, 0.0, 0.0)))
     assert model.joint("tail").type == mujoco.mjtJoint.mjJNT_HINGE

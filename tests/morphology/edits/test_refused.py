@@ -90,7 +90,7 @@ def test_the_bounds_are_those_that_are_documented() -> None:
     ("make", "message"),
     [
         *(
-            (lambda kind=kind, x=x: kind("*", **x), f"{kind.__name__} takes either scale or to")
+            (lambda kind=kind, x=x: kind("*", **x), f"{kind.__name__} needs either scale or to")
             for kind in _VALUES
             for x in ({}, {"scale": 2.0, "to": 3.0})
         ),
@@ -112,10 +112,10 @@ def test_the_bounds_are_those_that_are_documented() -> None:
         (lambda: AddLimb("a", "", 1.0), "suffix of AddLimb: Expected `str` of length >= 1"),
         (lambda: JointRange("hip"), "needs a lower or upper limit"),
         (lambda: JointRange("hip", 2.0, 1.0), "lower limit must be below the upper one"),
-        (lambda: Gravity((200.0, 0.0, -200.0)), "Gravity is at most 250 m/s², got 282.8"),
-        (lambda: PlaceGeom("a", start=_END), "PlaceGeom takes two different ends"),
-        (lambda: PlaceGeom("a", _END, _END), "PlaceGeom takes two different ends"),
-        (lambda: PlaceGeom("a"), "PlaceGeom takes two different ends"),
+        (lambda: Gravity((200.0, 0.0, -200.0)), "Gravity must be at most 250 m/s², got 282.8"),
+        (lambda: PlaceGeom("a", start=_END), "PlaceGeom needs a radius, two different ends"),
+        (lambda: PlaceGeom("a", _END, _END), "PlaceGeom needs a radius, two different ends"),
+        (lambda: PlaceGeom("a"), "PlaceGeom needs a radius, two different ends"),
         (lambda: Mass("a", scale=np.array([1.0, 2.0])), "scale of Mass: Expected `float | null`"),  # type: ignore[arg-type]
         (lambda: Stretch(3, 2.0), "body of Stretch: Expected `str`, got `int`"),  # type: ignore[arg-type]
     ],
@@ -159,7 +159,7 @@ def test_the_nearest_element_of_the_kind_is_suggested(edit: Edit) -> None:
         ),
         (leg, JointRange("knee", lower=1.0), r"The range of 'knee' would be 1.0 to"),
         *(
-            (gantry, edit, "'y' slides without limits: give both")
+            (gantry, edit, "'y' is a slide without limits: give both")
             for edit in (JointRange("y", lower=-1.0), JointRange("y", upper=1.0))
         ),
         (gantry, Lock("y"), "'y' slides without limits, so it has no middle"),
@@ -185,8 +185,8 @@ def test_the_nearest_element_of_the_kind_is_suggested(edit: Edit) -> None:
             Density("link", scale=2.0),
             "'link' has a mass or inertia written out, so its density has",
         ),
-        (leg, PlaceGeom("sole", (0.0, 0.0, 0.0), _END), "'sole' is no capsule or cylinder"),
-        (leg, PlaceGeom("trunk", radius=0.1), "'trunk' is no sphere, capsule or cylinder"),
+        (leg, PlaceGeom("sole", (0.0, 0.0, 0.0), _END), "'sole' is not a capsule or cylinder"),
+        (leg, PlaceGeom("trunk", radius=0.1), "'trunk' is not a sphere, capsule or cylinder"),
         (leg, AddMotor("*"), r"matches '\*' has a motor, or none matches"),
         (leg, AddFreeJoint("trunk"), "'trunk' is not fixed: it has the joint 'root'"),
         (leg, AddFloor(), "A new geom needs an unused name, got 'floor'"),

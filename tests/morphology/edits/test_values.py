@@ -77,7 +77,7 @@ def test_a_gear_keeps_its_direction() -> None:
         (Gear("jet", to=-2.0), [0.5, 0.0, -2.0, 0.0, 1.0, 0.0]),
     ):
         np.testing.assert_allclose(built(spec_of(_MOTORS), edit).actuator("jet").gear, gear)
-    with pytest.raises(MorphologyError, match="'idle' is no motor or has a gear of zero"):
+    with pytest.raises(MorphologyError, match="'idle' is not a motor, or its gear is zero"):
         built(spec_of(_MOTORS), Gear("*", scale=2.0))
 
 

@@ -55,12 +55,12 @@ _REFUSED: list[tuple[mujoco.MjSpec, Edit, str]] = [
     (
         arm(spatial(_THREE, 'damping="1"')),
         Remove("lower"),
-        "The tendon 'rope' also moves what stays when 'lower' is removed",
+        "The tendon 'rope' also moves bodies that stay without 'lower'",
     ),
     (
         arm(f'<tendon><fixed name="sum" stiffness="1">{_SUM}</fixed></tendon>'),
         Remove("lower"),
-        "The tendon 'sum' also moves what stays",
+        "The tendon 'sum' also moves bodies that stay",
     ),
     (
         arm(_equal('<joint joint1="other" joint2="lower"/>')),
@@ -95,7 +95,7 @@ _REFUSED: list[tuple[mujoco.MjSpec, Edit, str]] = [
     (
         arm(_sensor('<distance name="gap" body1="lower" body2="trunk"/>')),
         Split("lower", "far"),
-        "'lower' cannot be split: the sensor 'gap' is about all of its geoms",
+        "'lower' cannot be split: the sensor 'gap' needs all of its geoms",
     ),
     (
         arm(_equal('<joint joint1="lower" joint2="upper" polycoef="0 1 1 0 0"/>')),
@@ -135,9 +135,9 @@ _REFUSED: list[tuple[mujoco.MjSpec, Edit, str]] = [
     (
         arm('<actuator><position name="servo" joint="lower" kp="3"/></actuator>'),
         Gear("servo", to=2.0),
-        "'servo' is no motor or has a gear of zero, .* give a servo a scale",
+        "'servo' is not a motor, or its gear is zero, .* give a servo a scale",
     ),
-    (arm(joint=_SPRING), Damping("upper", to=1.0), "takes its damping from"),
+    (arm(joint=_SPRING), Damping("upper", to=1.0), "derives its damping from"),
     (arm(joint=_SPRING), Stiffness("*", scale=2.0), "its stiffness from its"),
 ]
 

@@ -1,8 +1,8 @@
 """The certificate of a shift: the proven differences between two embodiments, or a refusal.
 
-Shifts are easily declared and not applied: a friction that the floor's exceeds, a context that
-nothing reads. So two environments are compared by their effective models and by their responses to
-the same commands. A shift that changes neither is refused.
+Some declared shifts have no effect: a friction below the floor's, a context that no code reads. So
+two environments are compared by their effective models and by their responses to the same commands.
+A shift that changes neither is refused.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ _Range = tuple[float, float]
 # compiled elsewhere and loaded from a file.
 _STALE: Final = 1e-6
 _LARGEST: Final = float(np.finfo(np.float64).max)
-# Models that differ by rounding part slowly: HalfCheetah-v1 with its masses written out differs
-# from the original by 4e-16 kg, its observations by at most 1e-11 after 10 steps and by 0.2 after
-# 94, and no step of six of Gymnasium's robots parts by more than 230 times as much as those before
-# (15 seeds). A difference in what is sensed, done or rewarded is there at once, even if late.
+# Rollouts of models that differ by rounding diverge slowly. HalfCheetah-v1 with its masses written
+# out differs from the original by 4e-16 kg, in its observations by at most 1e-11 after 10 steps and
+# by 0.2 after 94. For six of Gymnasium's robots (15 seeds), no step multiplied the largest earlier
+# difference by more than 230. Differences in sensors, actions or rewards have no such slow start.
 _TOLERANCE: Final = 1e-8  # Absolute for numbers up to 1, relative for larger ones.
 _GROWTH: Final = 1e4
 
@@ -49,15 +49,15 @@ _GROWTH: Final = 1e4
 class Rollout(msgspec.Struct, frozen=True):
     """Comparison of the responses of two environments to the same commands.
 
-    It shows what a compiled model does not: noise and delay of sensors, another start, another
-    reward.
+    It also shows differences outside the compiled model: in sensor noise and delay, the start and
+    the reward.
 
     Attributes:
         steps: Commands given before the first of the two ended its episode.
-        identical: Whether both gave the same numbers, the same rewards and the same end.
-        differs_by_rounding: Whether they differ by no more than rounding explains, or not at all.
-        sentences: Where the observations part, which of them only one has, and how rewards and
-            ends differ.
+        identical: Whether observations, rewards and ends are the same.
+        differs_by_rounding: Whether rounding explains all differences; true without differences.
+        sentences: Where the observations diverge, which numbers only one environment observes, and
+            how rewards and ends differ.
     """
 
     steps: int
@@ -78,13 +78,13 @@ class Certificate(msgspec.Struct, frozen=True):
         source: Label of the source.
         target: Label of the target.
         source_fingerprint: Fingerprint of the source's effective model.
-        target_fingerprint: Fingerprint of the target's.
+        target_fingerprint: Fingerprint of the target's effective model.
         changes: Differences of the effective models, and of the standing heights.
         rollout: Responses of both to the same commands.
         source_inconsistencies: Inconsistencies of the source's model.
         target_inconsistencies: Inconsistencies of the target's model, or between the two.
         source_files: Hashes of the user's own modules that the source needs, by file.
-        target_files: The same of the target.
+        target_files: Hashes of the user's own modules that the target needs, by file.
     """
 
     source: str
@@ -107,8 +107,8 @@ class Certificate(msgspec.Struct, frozen=True):
     def is_empty(self) -> bool:
         """Return whether models and rollouts differ by no more than rounding.
 
-        One rule for all models: even equal ones may round differently, because MuJoCo computes
-        relative to the centre of mass of the whole, with the masses of what cannot move.
+        Even equal models may round differently, because MuJoCo computes relative to the centre of
+        mass of the whole model, which includes bodies that cannot move.
         """
         return self.same_model and self.rollout.differs_by_rounding
 
@@ -157,10 +157,10 @@ def certify(
 ) -> Certificate:
     """Compare two environments and certify the shift between them.
 
-    Both are reset and stepped, and left in the middle of an episode. Wrappers count: observations
-    belong to the outermost one. An environment has `reset` and `step` as in Gymnasium, which is not
-    needed, a `model`, an `observation_layout`, an `action_layout`, and, if it stands, a
-    `standing_height`, m.
+    Both are reset and stepped, and left in the middle of an episode. Observations are read from the
+    outermost wrapper. An environment must have `reset` and `step` as in Gymnasium, a `model`, an
+    `observation_layout` and an `action_layout`, and may have a `standing_height`, m. Gymnasium
+    itself is not needed.
 
     Args:
         source: The environment in which a policy is trained.
@@ -211,8 +211,8 @@ def matched_commands(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Draw commands for two robots: the same for motors of the same name, zero for the others.
 
-    The numbers of a motor depend on the seed and its name alone. They lie where the ranges of the
-    two overlap. The commands of each have the shape (steps, size of its layout).
+    The commands of a motor depend only on the seed and on its name, and lie where its ranges in the
+    two robots overlap. Each array has the shape (steps, size of the robot's action layout).
     """
     one, two = (dict(zip(value_names(s), _ranges(s), strict=True)) for s in (source, target))
 
@@ -231,7 +231,7 @@ def matched_commands(
 
 
 def _ranges(layout: Layout) -> list[_Range]:
-    """Return a finite range for each number: to -1 or 1, or beyond, where it has no bound."""
+    """Return a finite range for each number; a missing bound becomes -1 or 1, or lies beyond."""
     low, high = layout.low, layout.high
     bottom = np.where(np.isfinite(low), low, np.minimum(-1.0, high - 1.0))
     top = np.where(np.isfinite(high), high, np.maximum(1.0, low + 1.0))
@@ -243,8 +243,8 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
 
     A command is drawn per motor name, so a motor that both have gets the same number whatever
     other motors there are; a motor that one lacks gets zero. The source runs first and the target
-    after it, so one object may be both. Each is left in the middle of an episode, which has fewer
-    `steps` if it ends.
+    after it, so one object may be both. Each is left in the middle of an episode. The rollout stops
+    after fewer than `steps` steps if an episode ends.
     """
     commands = matched_commands(_layout(source, "action"), _layout(target, "action"), steps, seed)
     before, over = _drive(source, commands[0], seed)
@@ -253,7 +253,7 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
     ended = over and len(before) == rows, new_over and len(after) == rows
     old, new = (value_names(_layout(env, "observation")) for env in (source, target))
     sizes = before.shape[1] - 1, after.shape[1] - 1
-    if (len(old), len(new)) != sizes:  # A wrapper has changed the numbers: use their places.
+    if (len(old), len(new)) != sizes:  # A wrapper has changed the observation: name its indices.
         old, new = ([f"observation[{place}]" for place in range(size)] for size in sizes)
     shared = [name for name in old if name in frozenset(new)]
     gaps, excess = _gaps(
@@ -277,7 +277,7 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
         sentences += [f"Rewards differ by up to {reward:.4g} a step."]
     if ended[0] != ended[1]:
         sentences += [f"Only the {'source' if ended[0] else 'target'} ended its episode."]
-    # A difference that rounding does not explain is there at once, be it of the end.
+    # Rounding explains neither a sudden difference nor another end without a difference before it.
     largest_before = np.append(0.0, np.maximum.accumulate(excess)[:-1])
     sudden = bool(np.any((excess > 1.0) & (excess > _GROWTH * largest_before)))
     sudden |= ended[0] != ended[1] and bool(excess.max() <= 1.0)
@@ -305,7 +305,7 @@ def _gaps(before: _Floats, after: _Floats) -> tuple[_Floats, _Floats]:
 
 
 def _drive(env: Any, commands: NDArray[np.float32], seed: int) -> tuple[_Floats, bool]:
-    """Return observations with the reward, of the reset 0, (steps + 1, size + 1), and the end."""
+    """Return the rows of observation and reward, (steps + 1, size + 1), and whether it ended."""
     observation, _ = env.reset(seed=seed)
     rows, ended = [np.append(_flat(observation), 0.0)], False
     for command in commands:
@@ -321,7 +321,9 @@ def _flat(observation: Any) -> _Floats:
     if isinstance(observation, Mapping):
         parts = cast("Mapping[str, Any]", observation)
         return np.concatenate([_flat(parts[key]) for key in sorted(parts)])
-    return np.array(observation, np.float64).ravel()  # A copy, should the env reuse its memory.
+    return np.array(
+        observation, np.float64
+    ).ravel()  # A copy, because the env may reuse its memory.
 
 
 def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None) -> tuple[str, ...]:
@@ -334,7 +336,7 @@ def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None)
 
     Args:
         model: The model.
-        source: Another model with the same bodies, whose masses must not differ alone.
+        source: Another model with the same bodies; where a mass differs, the inertia must differ.
     """
     names, owner, found = names_of(model), model.geom_bodyid, list[str]()
     before = names_of(source)["bodies"] if source else []

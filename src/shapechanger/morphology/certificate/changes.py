@@ -29,13 +29,13 @@ ROUNDING: Final = 1e-9
 mass, another order of a sum and another processor change the last bits, and constants that MuJoCo
 derives are less exact."""
 _NOISE: Final = 1e-14
-"""The same, relative to the largest number of this field in the whole model: a computed zero, such
-as after turning a frame, is not exactly zero."""
+"""Tolerance relative to the largest number of a field in the whole model: a computed zero, such as
+after turning a frame, is not exactly zero."""
 _ROUNDED_TO: Final = 10  # Digits of the largest number of a field: a half of `ROUNDING` at most.
 # 64 bits: the chance that two of a million different models collide is 1 in 37 million.
 _HEX_DIGITS: Final = 16
 
-# What an element is called, and the quantity that describes one which only one of two models has.
+# Title of each kind of element, and the quantity shown for an element that only one model has.
 _TITLES: Final = {section: title for section, (title, _, _) in KINDS.items()} | {
     "contacts": "contact",
     "whole": "array",
@@ -50,9 +50,9 @@ class Change(msgspec.Struct, frozen=True):
     Attributes:
         quantity: Name of the quantity, such as "mass", "length", "contact friction" or "gear"; the
             kind of element, such as "body", if only one of the two has the element.
-        element: Name of the element that it belongs to; names, with commas, in a group.
+        element: Name of the element that changes; several names, with commas, for a group.
         before: Numbers or words in the source; None if it has none.
-        after: The same in the target; None if it has none.
+        after: Numbers or words in the target; None if it has none.
         unit: Unit of both; "1" for a dimensionless number, empty for words and for mixed units.
     """
 
@@ -74,7 +74,7 @@ class Change(msgspec.Struct, frozen=True):
         if self.quantity in _TITLES.values():
             there, done = (self.before, "removed") if self.after is None else (self.after, "added")
             return f"{self.quantity} {done} ({_shown(there, '.4g', unit)})"
-        for digits in (".4g", ""):  # As many as it takes to tell them apart.
+        for digits in (".4g", ""):  # Show all digits if four do not distinguish the numbers.
             old, new = (_shown(values, digits, unit) for values in (self.before, self.after))
             if old != new:
                 break
@@ -99,7 +99,7 @@ def _shown(values: Values | None, digits: str, unit: str) -> str:
 
 
 def _times(before: Values, after: Values) -> str:
-    """Format new over old, if it is the same for all numbers that are not zero in both."""
+    """Format the ratio of new to old, if all numbers that are not zero have the same ratio."""
     if len(before) != len(after) or len(_finite((*before, *after))) != 2 * len(before):
         return ""
     old, new = np.array(before, float), np.array(after, float)
@@ -161,8 +161,8 @@ def _lengths(
 ) -> tuple[list[_Row], set[str]]:
     """Return lengths, without caps, and radii of round geoms in both models, and their names.
 
-    A geom that touches nothing is reported only if its body differs; one that is the only one of
-    its body is called by the name of the body.
+    A geom that touches nothing is reported only if its body differs. The only geom of a body is
+    reported under the body's name.
     """
     found, measured = list[_Row](), set[str]()
     names, targets = names_of(source), names_of(target)["geoms"]
@@ -250,9 +250,9 @@ def _equal(before: Values | None, after: Values | None, scale: float = 0.0) -> b
 def fingerprint(model: mujoco.MjModel) -> str:
     """Return the first 16 hex digits of the SHA-256 of all that decides a model's motion.
 
-    It is the same in every process and on every machine, whose compilers and processors may round
-    differently: numbers count up to rounding. It does not change with colours, cameras, lights, or
-    anything else without effect.
+    Numbers are rounded, so it is the same in every process and on every machine, although compilers
+    and processors round differently. Colours, cameras, lights and other data without an effect on
+    the motion do not change it.
     """
     rounded: list[object] = []
     for section, elements in moved_numbers(model).items():
@@ -264,9 +264,9 @@ def fingerprint(model: mujoco.MjModel) -> str:
 
 
 def fingerprints(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str]:
-    """Return the fingerprints of what decides a model's motion and of what else may be read.
+    """Return the fingerprint of a model's motion, and one of all other data that envs may read.
 
-    Cameras, lights and colours are among the latter if `drawn`.
+    The second includes cameras, lights and colours if `drawn`.
     """
     sensed = [_rounded(values, 0.0) for values in sensed_values(model, drawn=drawn)]
     return fingerprint(model), _digest_of(sensed)

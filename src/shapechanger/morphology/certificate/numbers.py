@@ -1,9 +1,9 @@
 """Numbers of a compiled model, read by the table `fields.toml`, and its contacts.
 
-An array whose condition does not hold for an element has no effect on it and is left out, and so
-are elements that do nothing: geoms that neither touch nor guide a tendon, sites that nothing names,
-and bodies that carry nothing but those. Joints and actuators stand in the order of the model, which
-decides what the numbers of its state and its control mean; all else is sorted by name.
+A number is left out if the condition of its array does not hold for the element. Elements without
+an effect are left out too: geoms that neither touch nor guide a tendon, sites without references,
+and bodies that carry only such elements. Joints and actuators are in the model's order, which
+gives the numbers of state and control their meaning; all other elements are sorted by name.
 
 The friction of one geom may have no effect: a contact uses the larger coefficient of its two geoms,
 so a slippery foot on a rough floor acts like a rough foot. `contact_arrays` follows the
@@ -53,8 +53,8 @@ _ENABLE: Final = mujoco.mjtEnableBit
 _FRICTION_COUNT: Final = {1: 0, 3: 2, 4: 3, 6: 5}
 _SLIDE_SPIN_ROLL: Final = [0, 0, 1, 2, 2]
 _FLAT: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-# Switches that decide what is computed besides the motion, and those that contacts and limits have
-# already taken into account.
+# Switches without an effect on the motion, and switches whose effect is already contained in the
+# numbers of contacts and limits.
 _QUIET: Final = {
     *("sensor", "midphase", "energy", "fwdinv"),
     *("contact", "filterparent", "refsafe", "override"),
@@ -97,7 +97,7 @@ KINDS: Final = {
 
 
 def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
-    """Return the kinds of the elements that indices of several kinds are of; "" for none."""
+    """Return the kind of element of each index in arrays of mixed kinds; "" for no element."""
     section = {kind: name for name, (_, _, kind) in KINDS.items()} | {_O.mjOBJ_XBODY: "bodies"}
     ends = zip(m.actuator_trntype.tolist(), m.actuator_trnid[:, 1].tolist(), strict=True)
     ties = zip(m.eq_type.tolist(), m.eq_objtype.tolist(), strict=True)
@@ -117,7 +117,7 @@ def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
 
 
 def made_arrays(m: mujoco.MjModel) -> dict[str, Any]:
-    """Return the arrays of the table that MuJoCo does not have, but for contacts."""
+    """Return the arrays of the table that MuJoCo does not have, except the arrays of contacts."""
     option, moves, free = m.opt, m.body_treeid >= 0, m.jnt_type == _J.mjJNT_FREE
     medium = option.density > 0.0 or option.viscosity > 0.0
     wraps = np.isin(m.wrap_type, [_W.mjWRAP_SPHERE.value, _W.mjWRAP_CYLINDER.value])
@@ -136,7 +136,7 @@ def made_arrays(m: mujoco.MjModel) -> dict[str, Any]:
         # A plane's size is drawn, but has no effect on collisions.
         "geom_sized": m.geom_type != mujoco.mjtGeom.mjGEOM_PLANE,
         "geom_shape": [_shape(m, geom) for geom in range(m.ngeom)],
-        # A fluid pushes on these by the ellipsoid model.
+        # Geoms on which a fluid acts by MuJoCo's ellipsoid model.
         "geom_in_fluid": (m.geom_fluid[:, 0] > 0.0) & medium,
         "wrap_side": np.where(wraps, m.wrap_prm, -1.0).astype(np.int64),
         "wrap_coefficient": np.where(wraps, 0.0, m.wrap_prm),
@@ -145,7 +145,7 @@ def made_arrays(m: mujoco.MjModel) -> dict[str, Any]:
         "actuator_has_sites": np.isin(m.actuator_trntype, sites),
         "actuator_is_crank": m.actuator_trntype == _T.mjTRN_SLIDERCRANK,
         "actuator_is_muscle": m.actuator_gaintype == mujoco.mjtGain.mjGAIN_MUSCLE,
-        # Their joint or tendon knows of their damping and armature.
+        # Actuators whose damping and armature act on their joint or tendon.
         "actuator_added": np.isin(
             np.arange(m.nactuator), np.concatenate([m.jnt_actuatorid, m.tendon_actuatorid])
         ),
@@ -167,8 +167,8 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
     """Return the pairs that MuJoCo tests for collision and whose contacts can have an effect.
 
     Returns:
-        The indices of the explicit `<pair>` elements, shape (n,); and the geoms of every other
-        pair, which pass the filters, shape (m, 2).
+        The indices of the explicit `<pair>` elements, shape (n,); and the geoms of each other pair
+        that passes the filters, shape (m, 2).
     """
     flags = model.opt.disableflags
     if flags & (_DISABLE.mjDSBL_CONSTRAINT | _DISABLE.mjDSBL_CONTACT):
@@ -213,8 +213,8 @@ def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
     """Return the contacts that can have an effect, a row each, with their effective parameters.
 
     Keys are the names of `pair_*` with the prefix `contact_`, and `contact_geoms` (n, 2). Friction
-    (n, 5) is slide, slide, spin, roll, roll, 0 without effect; `contact_softens` is true for a
-    friction with a different solref.
+    (n, 5) is slide, slide, spin, roll, roll, and 0 for a direction that has no friction;
+    `contact_softens` is true if friction has a different solref from the normal direction.
     """
     explicit, dynamic = colliding_pairs(model)
     values: dict[str, NDArray[Any]] = {
@@ -236,14 +236,14 @@ def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
     elliptic = option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
     differs = values["solreffriction"].any(axis=1) & (own != softness).any(axis=1)
     values["softens"] = differs & (dimensions > 1) & elliptic
-    # Read only if the compiler, or mj_setConst, found a geom or a pair that has some.
+    # MuJoCo reads adhesion only if the compiler, or mj_setConst, has found some.
     values["adhesion"] = values["adhesion"] * model.flg_adhesion
     values["geoms"] = np.vstack([geoms_of_pairs(model)[explicit], dynamic])
     return {f"contact_{name}": array for name, array in values.items()}
 
 
 def mixed_parameters(model: mujoco.MjModel, pairs: _Ints) -> dict[str, _Floats]:
-    """Return the parameters that MuJoCo mixes for pairs of geoms (n, 2), called as in `pair_*`."""
+    """Return the parameters that MuJoCo mixes for pairs of geoms (n, 2), named as in `pair_*`."""
     priority = model.geom_priority[pairs[:, 0]] - model.geom_priority[pairs[:, 1]]
     # The weight of the first geom's solver parameters; half if neither states one.
     weights = np.where(model.geom_solmix < mujoco.mjMINVAL, 0.0, model.geom_solmix)[pairs]
@@ -311,7 +311,7 @@ def moved_numbers(model: mujoco.MjModel) -> Numbers:
 
 
 def sensed_values(model: mujoco.MjModel, *, drawn: bool) -> list[Values]:
-    """Return all else that an env may read: names, numbers and digests; `drawn` for frames."""
+    """Return data that an env may read besides the motion; with `drawn`, also data of frames."""
     reader = _Reader(model)
     found = [tuple[float | str, ...](reader.names[kind]) for kind in TABLE["read_by_name"]]
     found += [_plain(reader.values(Field(name))) for name in TABLE["sensed"]]
@@ -344,7 +344,7 @@ class _Reader:
         return rows
 
     def array(self, name: str) -> Any:
-        """Return an array of the table; of the options, with one row."""
+        """Return an array of the table; arrays of the options have one row."""
         if name in self._made:
             return self._made[name]
         if name.startswith("opt_"):
@@ -369,7 +369,7 @@ class _Reader:
             ]
             return np.array(words, np.str_)
         if field.array.endswith("quat") and not field.array.startswith("key_"):
-            # Use the quaternion with a positive first number, of the two for each rotation.
+            # Of the two quaternions of a rotation, use the one that begins with a positive number.
             leading = np.argmax(values != 0.0, axis=1)[:, None]
             return values * np.where(np.take_along_axis(values, leading, axis=1) < 0.0, -1.0, 1.0)
         if "_solref" in field.array and not field.array.startswith("opt_"):
@@ -450,7 +450,7 @@ def names_of(model: mujoco.MjModel) -> dict[str, list[str]]:
         owner = "" if owners is None else f"{bodies[owners[i]]}_"
         return owner + title.partition(" ")[0]
 
-    # Actuators come last, because they are called as their targets are.
+    # Actuators come last, because they are named after their targets.
     for section in (*(kind for kind in KINDS if kind != "actuators"), "actuators"):
         free = unique_namer(names[section])
         for i, name in enumerate(names[section]):

@@ -2,7 +2,7 @@
 
 Every edit has an `amount`, the share of the change that is made. It is 1 except between two
 bodies, where it makes the path continuous (see `shapechanger.morphology.interpolate`). Every
-module of this folder is imported, so a file with an edit needs to be named nowhere else.
+module of this folder is imported, so a new file with an edit needs no further registration.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Ratio = Annotated[float, msgspec.Meta(ge=0.01, le=100.0)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 
 EDITS: Final[dict[str, type[Edit]]] = {}
-"""The kinds of edits by their names in JSON; a subclass of `Edit` with an `apply` enters itself."""
+"""The kinds of edits by their names in JSON; a subclass of `Edit` with an `apply` adds itself."""
 
 
 def _tag(class_name: str) -> str:
@@ -49,9 +49,9 @@ class Edit(
 ):
     """One change to a model.
 
-    A subclass with an `apply` is known to JSON by the snake case of its name, as worker processes
-    and files need, once its module is imported; a base of several kinds has no `apply`, or a name
-    that begins with an underscore. The types of its fields, with their bounds as
+    When the module of a subclass is imported, its name in snake case becomes a kind of edit in
+    JSON, which files and worker processes use. A base class of several kinds must have no `apply`,
+    or a name that begins with an underscore. The types of the fields, with their bounds as
     `msgspec.Meta`, are checked when an edit is made.
 
     Attributes:
@@ -69,7 +69,7 @@ class Edit(
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
         if cls.apply is Edit.apply or cls.__name__.startswith("_"):
-            return  # A base of several kinds.
+            return  # A base class of several kinds of edits.
         tag = _tag(cls.__name__)
         known = EDITS.get(tag, cls)
         # A module that is imported again, perhaps under another name, defines its classes again.
@@ -114,8 +114,8 @@ class Edit(
         """Make the change in the keyframes too, after `apply`; most edits change none.
 
         Args:
-            spec: The changed specification; its keyframes are elsewhere meanwhile.
-            keyframes: Its keyframes.
+            spec: The changed specification, without its keyframes.
+            keyframes: The keyframes.
         """
 
     def require_effect(self, spec: mujoco.MjSpec) -> None:
@@ -140,6 +140,6 @@ def part_of_the_way(old: _N, new: _N, amount: float) -> _N:
     return new if amount == 1.0 else old + amount * (new - old)
 
 
-# They subclass `Edit`.
+# These modules subclass `Edit`, so they are imported after it is defined.
 for _module in pkgutil.iter_modules(__path__, f"{__name__}."):
     importlib.import_module(_module.name)

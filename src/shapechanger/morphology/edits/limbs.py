@@ -34,12 +34,12 @@ _J: Final = mujoco.mjtJoint
 _O: Final = mujoco.mjtObj
 # MuJoCo needs a range above zero: smallest range of a partly locked joint.
 _NARROWEST_RAD: Final = 1e-3
-# MuJoCo refuses bodies of almost no mass, so a limb that exists in part is never smaller than this
-# share of its full size, which is a millionth of its mass. A motor is never weaker than this share.
+# MuJoCo refuses bodies of almost no mass, so a limb that exists in part has at least this share of
+# its full size, and so a millionth of its mass. A motor has at least this share of its strength.
 _SMALLEST_PART: Final = 0.01
 # Distance within which a geom counts as lying on the axis of its segment, m.
 _ON_THE_AXIS_M: Final = 1e-12
-# Fields of the resistance of a joint or tendon, and those that a hinge takes from another.
+# Fields of the resistance of a joint or tendon, and fields that a new hinge copies from another.
 _RESISTANCE: Final = ("armature", "damping", "stiffness", "frictionloss")
 _HINGE_FIELDS: Final = (
     *(*_RESISTANCE, "margin"),
@@ -50,13 +50,13 @@ _HINGE_FIELDS: Final = (
 class Lock(Edit, frozen=True):
     """Lock hinges or slides at a position: remove the joints and their motors, keep the limbs.
 
-    A joint that is coupled to a locked one is held where the coupling puts it. Both spaces shrink,
-    so a policy needs a body map to be transferred; the rule `hold` of the map presents the locked
-    position to the policy.
+    A joint that is coupled to a locked one is held where the coupling puts it. Observation and
+    action space shrink, so the transfer of a policy needs a body map; the rule `hold` of the map
+    presents the locked position to the policy.
 
     Attributes:
         joint: Name or glob of the joints.
-        position: Position at which it is locked, rad or m; None for the middle of its range.
+        position: Position at which a joint is locked, rad or m; None for the middle of its range.
     """
 
     joint: str
@@ -105,7 +105,7 @@ class AddMotor(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add a motor to every joint that matches and has none."""
         moved = {each.target for each in spec.actuators if each.trntype in references.OF_JOINTS}
-        # This includes models that make two joints follow each other: one of them has a motor.
+        # A glob skips followers; a joint that follows another can get a motor if it is named.
         couplings = [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT]
         moved |= {e.name1 for e in couplings if e.name2 and e.active and e.name1 != self.joint}
         found = select("joint", self.joint, spec.joints)
@@ -293,7 +293,7 @@ class Split(Edit, frozen=True):
     def _divide(self, geom: Any, copy: Any, piece: geometry.NearPart, place: np.ndarray) -> None:
         """Divide a geom: it becomes the nearer half, a copy on the other body the farther one."""
         whole = geometry.volume(geom)
-        # Scaled about its near end, which is then moved to the cut.
+        # Scale the copy about its near end, and then move that end to the cut.
         geometry.move_by(copy, -piece.near)
         geometry.shorten(copy, piece._replace(near=np.zeros(3)), 1.0 - piece.share)
         end = piece.near + 2.0 * (geometry.middle_of(geom) - piece.near)
@@ -448,7 +448,7 @@ def _add_segment(
     own = next((j for j in body.joints if j.type == _J.mjJNT_HINGE), None)
     axis = edit.axis if own is None or edit.axis is not None else own.axis
     if axis is None:
-        raise MorphologyError(f"{body.name!r} has no hinge to take the axis from: give one.")
+        raise MorphologyError(f"{body.name!r} has no hinge whose axis can be used: give an axis.")
     part = body.add_body(name=edit.name, pos=place, gravcomp=body.gravcomp)
     hinge = part.add_joint(name=edit.name, type=_J.mjJNT_HINGE, axis=axis)
     for field in _HINGE_FIELDS if own is not None else ():

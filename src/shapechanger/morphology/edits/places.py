@@ -22,7 +22,7 @@ from shapechanger.morphology.spec.carried import Keyframes
 _G: Final = mujoco.mjtGeom
 _J: Final = mujoco.mjtJoint
 _ROUND: Final = (_G.mjGEOM_SPHERE, *geometry.LONG)
-# Share of an axis that is vertical from which a slide raises its body.
+# A slide raises its body if the vertical part of its unit axis is larger than this.
 _VERTICAL: Final = 1.0 - 1e-6
 
 
@@ -117,7 +117,8 @@ class PlaceGeom(Edit, frozen=True):
             valid &= self.middle is None
         if not valid:
             raise MorphologyError(
-                f"PlaceGeom takes two different ends or a middle, a radius, or both, got {self}."
+                "PlaceGeom needs a radius, two different ends or a middle, and not both ends and a "
+                f"middle, got {self}."
             )
 
     def apply(self, spec: mujoco.MjSpec) -> None:
@@ -131,9 +132,9 @@ class PlaceGeom(Edit, frozen=True):
                     old, new = geometry.axis_ends(geom), np.array([self.start, self.end], float)
                     if not len(old):
                         raise MorphologyError(
-                            f"{geom.name!r} is no capsule or cylinder, so it has no ends."
+                            f"{geom.name!r} is not a capsule or cylinder, so it has no ends."
                         )
-                    # The ends of a geom that is given by its pose have no order: match the nearest.
+                    # The ends of a geom defined by its pose have no order: match the nearest.
                     here, turned = (np.linalg.norm(old - n, axis=1).sum() for n in (new, new[::-1]))
                     if not geometry.has_ends(geom) and here > turned:
                         old = old[::-1]
@@ -145,7 +146,8 @@ class PlaceGeom(Edit, frozen=True):
                 if self.radius is not None:
                     if geom.type not in _ROUND:
                         raise MorphologyError(
-                            f"{geom.name!r} is no sphere, capsule or cylinder, so it has no radius."
+                            f"{geom.name!r} is not a sphere, capsule or cylinder, so it has no "
+                            "radius."
                         )
                     geom.size[0] = part_of_the_way(geom.size[0], self.radius, self.amount)
 
@@ -194,7 +196,7 @@ class StartHeight(Edit, frozen=True):
             body.pos = self._raised(body.pos)
 
     def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
-        """Raise or lower the trunks in every keyframe too, because robots start in one."""
+        """Raise or lower the trunks in every keyframe too, because a robot may start in one."""
         trunks = select("trunk", self.body, spec.worldbody.bodies)
         for joint in (joint for body in trunks for joint in body.joints):
             axis = geometry.rotation(geometry.orientation(joint.parent)) @ joint.axis
@@ -202,7 +204,7 @@ class StartHeight(Edit, frozen=True):
             if joint.type == _J.mjJNT_FREE:
                 keyframes.change(joint.name, self._raised)
             elif vertical:
-                # At its reference the body is where the model puts it.
+                # When the slide is at its reference, the body is where the model puts it.
                 own = np.array([geometry.reference_of(joint)])
                 keyframes.change(joint.name, lambda old, own=own: old + self.amount * (own - old))
 
@@ -229,7 +231,7 @@ class AddFloor(Edit, frozen=True):
             name="floor",
             type=_G.mjGEOM_PLANE,
             pos=[0.0, 0.0, self.height],
-            size=[0.0, 0.0, 0.05],  # The grid that is drawn, m.
+            size=[0.0, 0.0, 0.05],  # Infinite along x and y; spacing of the drawn grid, m.
             friction=[self.friction, 0.005, 0.0001],  # The last two are MuJoCo's defaults, m.
             contype=1,
             conaffinity=1,

@@ -1,7 +1,7 @@
 """Edits of numbers: mass, density, strength, resistance, friction, range, gravity.
 
-Most are given as a ratio to what it was (`scale`) or as a new value (`to`), never both. In
-domain randomization, these are the operations `scale` and `abs`.
+Most edits take either a ratio to the old value (`scale`) or a new value (`to`). In domain
+randomization, these are the operations `scale` and `abs`.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ _D: Final = mujoco.mjtDisableBit
 _GAIN: Final = mujoco.mjtGain
 _BIAS: Final = mujoco.mjtBias
 _LINEAR: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE, _BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE)
-# Larger values are typing mistakes: in any unit here MuJoCo's numbers overflow, and gravity would
-# be ten times that at Jupiter's cloud tops (24.8 m/s²).
+# Larger values are typing mistakes. MuJoCo's numbers overflow at 1e6 in any unit used here, and
+# 250 m/s² is ten times the gravity at Jupiter's cloud tops (24.8 m/s²).
 _LARGEST: Final = 1e6
 _LARGEST_GRAVITY: Final = 250.0
 
@@ -42,9 +42,9 @@ class ValueEdit(Edit, frozen=True, tag=None):
     to: Annotated[float, Meta(ge=0.0, le=_LARGEST)] | None = None
 
     def check(self) -> None:
-        """Refuse anything but one of `scale` and `to`."""
+        """Require either `scale` or `to`."""
         if (self.scale is None) == (self.to is None):
-            raise MorphologyError(f"{type(self).__name__} takes either scale or to, got {self}.")
+            raise MorphologyError(f"{type(self).__name__} needs either scale or to, got {self}.")
 
     def changed(self, old: float) -> float:
         """Return the new value that replaces `old`."""
@@ -76,8 +76,7 @@ class Mass(ValueEdit, frozen=True):
 class TotalMass(Edit, frozen=True):
     """Scale all masses and inertias of the robot, so that it has this mass.
 
-    It acts on the robot as the edits before it have left it. Objects, which no actuator moves, keep
-    theirs.
+    Earlier edits count. Objects, which no actuator moves, keep their masses.
 
     Attributes:
         to: Mass of the robot's bodies together, kg, at most a million.
@@ -114,9 +113,9 @@ class Density(ValueEdit, frozen=True):
 class Gear(ValueEdit, frozen=True):
     """Change the strength of actuators: N·m of torque, or N of force, for a control of 1.
 
-    `to` sets the strongest axis of a motor's gear and keeps its direction. A servo keeps its
-    targets: its gains, its bias and its force range scale, and it takes a scale alone. A largest
-    force of the joint or tendon scales along where all of its actuators are changed.
+    `to` sets the strongest axis of a motor's gear and keeps its direction. A servo accepts only
+    `scale`, which scales its gains, bias and force range and keeps its targets. The force limit of
+    a joint or tendon scales too, if all of its actuators change by the same factor.
     """
 
     needs: ClassVar = (_D.mjDSBL_ACTUATION, "actuators")
@@ -139,8 +138,8 @@ class Gear(ValueEdit, frozen=True):
                 actuator.gear = np.where(gear == strongest, new, gear * factor)
             elif not strongest or self.scale is None:
                 raise MorphologyError(
-                    f"{actuator.name!r} is no motor or has a gear of zero, so no gear can be set: "
-                    "give a servo a scale instead."
+                    f"{actuator.name!r} is not a motor, or its gear is zero, so no gear can be "
+                    "set: give a servo a scale instead."
                 )
             else:
                 factor = self.changed(1.0)
@@ -162,7 +161,7 @@ def require_gear(gear: float | None) -> None:
 
 
 def _is_motor(actuator: mujoco.MjsActuator) -> bool:
-    """Return whether the force does not depend on where the actuator is: gain times control."""
+    """Return whether the force is gain times control, at any position of the actuator."""
     return actuator.gaintype == _GAIN.mjGAIN_FIXED and actuator.biastype == _BIAS.mjBIAS_NONE
 
 
@@ -192,7 +191,7 @@ def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
 
 
 class _Resistance(ValueEdit, frozen=True, tag=None):
-    """Base class of edits of a joint's linear coefficient, and of higher ones by a scale."""
+    """Base class of edits of damping or stiffness; `scale` also scales nonlinear coefficients."""
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every joint that matches."""
@@ -200,7 +199,7 @@ class _Resistance(ValueEdit, frozen=True, tag=None):
         for joint in select("joint", self.element, spec.joints):
             if all(number > 0.0 for number in joint.springdamper):
                 raise MorphologyError(
-                    f"{joint.name!r} takes its {field} from its springdamper, which would swallow "
+                    f"{joint.name!r} derives its {field} from its springdamper, which would undo "
                     "the change: write stiffness and damping out in the model."
                 )
             numbers = getattr(joint, field)
@@ -228,14 +227,14 @@ class Friction(ValueEdit, frozen=True):
     with `"*"`.
 
     Attributes:
-        component: Which coefficient.
+        component: The coefficient to change.
     """
 
     needs: ClassVar = (_D.mjDSBL_CONTACT, "contacts")
     component: Literal["sliding", "torsional", "rolling"] = "sliding"
 
     def require_effect(self, spec: mujoco.MjSpec) -> None:
-        """Refuse it where contacts are switched off, or their parameters overridden."""
+        """Refuse the edit if contacts are switched off, or their parameters overridden."""
         super().require_effect(spec)
         if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
             raise MorphologyError(
@@ -253,7 +252,7 @@ class Friction(ValueEdit, frozen=True):
 class JointRange(Edit, frozen=True):
     """Change how far hinges and slides move; a joint without limits becomes limited.
 
-    A slide without limits needs both. At a smaller amount, its limits are farther apart.
+    A slide without limits needs both limits. At a smaller amount, they are farther apart.
 
     Attributes:
         joint: Name or glob of the joints.
@@ -278,7 +277,7 @@ class JointRange(Edit, frozen=True):
         for joint in select("joint", self.joint, spec.joints):
             if (old := geometry.limits(joint)) is None:
                 if self.lower is None or self.upper is None:
-                    raise MorphologyError(f"{joint.name!r} slides without limits: give both.")
+                    raise MorphologyError(f"{joint.name!r} is a slide without limits: give both.")
                 # The smaller the amount, the wider.
                 reach = (self.upper - self.lower) / self.amount
                 old = self.lower - reach, self.upper + reach
@@ -303,9 +302,10 @@ class Gravity(Edit, frozen=True):
     to: Vector
 
     def check(self) -> None:
-        """Refuse one that is out of range."""
+        """Refuse an acceleration that is too large."""
         if (size := math.hypot(*self.to)) > _LARGEST_GRAVITY:
-            raise MorphologyError(f"Gravity is at most {_LARGEST_GRAVITY:g} m/s², got {size:g}.")
+            limit = f"at most {_LARGEST_GRAVITY:g} m/s²"
+            raise MorphologyError(f"Gravity must be {limit}, got {size:g}.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Set the model's gravity."""

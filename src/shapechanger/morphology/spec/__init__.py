@@ -46,7 +46,7 @@ LEAST_MASS: Final = 1e-14
 
 _O: Final = mujoco.mjtObj
 _W: Final = mujoco.mjtWrap
-_OLD: Final = "~old"  # Ends temporary names, while another element still has the name.
+_OLD: Final = "~old"  # Suffix of temporary names, while another element still has the name.
 # Not copied: names are unique, and orientations are written in units that belong to each element.
 _APART: Final = ("name", "alt", "ialt", "quat", "iquat", "classname", "childclass", "info")
 
@@ -122,7 +122,7 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
 
 
 def unique_namer(taken: Iterable[str], numbered: str = "_{}") -> Callable[[str], str]:
-    """Return a function that returns the name it is given, `numbered` if that is taken by now."""
+    """Return a function that returns an unused name: `numbered` is added to a used one."""
     used = set(taken)
 
     def free(name: str) -> str:
@@ -234,10 +234,10 @@ def _resolve(element: Any, turn: np.ndarray, shift: np.ndarray) -> None:
 
 
 def copy_element(spec: mujoco.MjSpec, element: Any, place: Any, name: str) -> Any:
-    """Add a copy of one element, with a free name or none, which names the same others.
+    """Add a copy of one element, with an unused or empty name, that refers to the same elements.
 
-    A body is copied without what hangs on it, a tendon without its path. The copy is added to
-    `place`, a body or frame, or for an element on no body to `spec`.
+    A body is copied without the elements attached to it, a tendon without its path. The copy is
+    added to `place`: a body or frame, or `spec` for an element that is not on a body.
     """
     kind = kind_of(element)
     if name:
@@ -277,11 +277,11 @@ def _copy_whole(
 
 
 def move(spec: mujoco.MjSpec, element: Any, parent: mujoco.MjsBody) -> Any:
-    """Attach a limb or a point to another body, at the same pose in its frame; names stay.
+    """Attach a limb or a point to another body, with the same name and pose in the body's frame.
 
     The new element is returned; the old handle is invalid.
     """
-    # References are by name, so renamed old elements lose them.
+    # References are by name: after renaming, they refer to the copies.
     for each in whole(element):
         each.name += _OLD
     moved = _copy_whole(spec, element, parent, lambda name: name.removesuffix(_OLD))
@@ -294,7 +294,7 @@ def share_contacts(
 ) -> None:
     """Give the farther part of a segment the exclusions and contact pairs of the whole.
 
-    `cut` has the names of the farther halves of geoms by the names of the nearer ones.
+    `cut` maps the name of the nearer half of each divided geom to the name of the farther half.
     """
     halves = {key_of(body): part.name}
     halves |= {(_O.mjOBJ_GEOM, near): far for near, far in cut.items()}
@@ -307,11 +307,11 @@ def share_contacts(
 def copy_limb(
     spec: mujoco.MjSpec, limb: mujoco.MjsBody, suffix: str, angle: float
 ) -> mujoco.MjsBody:
-    """Add a turned copy of a limb, with a copy of all that names its elements.
+    """Add a turned copy of a limb, with a copy of each element that refers to the limb.
 
-    Points of the body that carries the limb, where tendons and pins begin, are copied and turned
-    with it; any other element that is named together with one of the limb is shared. All names get
-    the suffix. The turn is about the z axis of the limb's parent, rad. The first body is returned.
+    If tendons or pins of the limb begin at points of the parent body, these points are copied and
+    turned too. Other elements outside the limb are shared. All copies have the suffix. The turn is
+    about the z axis of the limb's parent, rad. The first body of the copy is returned.
     """
     turn = np.array([math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
     # Mentions are read before the copy exists, because its cameras name elements too.
@@ -322,9 +322,9 @@ def copy_limb(
     resolve_frames(spec)
 
     def name_of(kind: mujoco.mjtObj, name: str) -> str:
-        """Return the name of the copy of an element; of one that is shared, its own.
+        """Return the name of the copy of an element, or the element's own name if it is shared.
 
-        A site or geom of the body that carries the limb is copied when it is first asked for.
+        The first call for a site or geom of the body that carries the limb copies it.
         """
         new = name + suffix
         if (kind, name) in inside or (kind, name) in turned:
@@ -336,12 +336,12 @@ def copy_limb(
         copy = copy_element(spec, point, parent, new)
         set_points(copy, points_of(copy) @ rotation(turn).T)
         copy.quat = product(turn, copy.quat)
-        if kind == _O.mjOBJ_GEOM:  # A tendon bends around it; that needs no second mass.
+        if kind == _O.mjOBJ_GEOM:  # Only a tendon bends around the copy, so it needs no mass.
             copy.mass, copy.contype, copy.conaffinity = 0.0, 0, 0
         turned.add((kind, name))
         return new
 
-    # Sensors last: they may name the others.
+    # Sensors come last, because they may refer to the others.
     holders = (*spec.tendons, *spec.equalities, *spec.excludes, *spec.pairs)
     for holder in cast("list[Any]", [*holders, *spec.actuators, *spec.sensors]):
         own = [mention for mention in named if mention.holder == holder]

@@ -1,8 +1,9 @@
 """Data that refer to positions or order: keyframes, pins of loops, paths of tendons.
 
-Edits see none of the keyframes, and each pin as two sites. MuJoCo states a pin in the frame of its
-first body, and takes its place on the second from the model's own pose. After the edits that pose
-is changed until what was closed in it is closed again; pins and keyframes are written back.
+While edits are applied, keyframes are removed and each pin is replaced by two sites. MuJoCo states
+a pin in the frame of its first body, and derives its place on the second body from the model's own
+pose. After the edits, that pose is changed until every loop that was closed in it is closed again.
+Then pins and keyframes are written back.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ _FIELDS: Final = {
     **{field: field for field in ("qpos", "qvel", "act", "ctrl")},
     **{"mpos": "mocap_pos", "mquat": "mocap_quat"},
 }
-_WITHIN: Final = 1e-6  # A tendon that is longer than its limit by less is within it, m or rad.
+_WITHIN: Final = 1e-6  # A tendon may exceed its limit by this much, m or rad.
 _TOGETHER: Final = 1e-8  # Points of a closed loop coincide within this, m.
-_STILL: Final = 1e-12  # A joint that moves less has not moved, rad or m.
+_STILL: Final = 1e-12  # A smaller motion of a joint is rounding, rad or m.
 CLOSED: Final = 1e-9
 """Residual of an equality that is closed, m or rad; above the rounding of a compiled model."""
 SINGULAR: Final = 1e-6
@@ -86,15 +87,15 @@ def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
 
 
 class Keyframes:
-    """The keyframes of a specification, out of the way of its edits.
+    """The keyframes of a specification, removed from it while edits are applied.
 
     Args:
-        spec: The specification, which loses them.
+        spec: The specification.
         model: The model that it compiles to; not needed without keyframes.
     """
 
     def __init__(self, spec: mujoco.MjSpec, model: Any) -> None:
-        # Name and time, the fields that are given, and numbers by field and name of an element.
+        # For each keyframe: name and time, the given fields, and numbers by field and element name.
         self._values: list[tuple[dict[str, Any], list[str], dict[tuple[str, str], Array]]] = []
         for i, key in enumerate(list(spec.keys)):
             data = mujoco.MjData(model)
@@ -121,7 +122,7 @@ class Keyframes:
                 values["qpos", joint] = changed(values["qpos", joint])
 
     def put_back(self, spec: mujoco.MjSpec) -> None:
-        """Add the keyframes to the edited specification; new elements have their own pose."""
+        """Add the keyframes to the edited specification; new elements get the model's own pose."""
         model: Any = compiled(spec) if self._values else None
         for about, given, values in self._values:
             data, key = mujoco.MjData(model), spec.add_key(**about)
@@ -133,7 +134,7 @@ class Keyframes:
 
 
 def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[tuple[str, str], Array]:
-    # By field of a keyframe and name of the element; views of `data`.
+    # Views of `data`, keyed by field of a keyframe and name of the element.
     found: dict[tuple[str, str], Array] = {}
     for joint in (data.joint(i) for i in range(model.njnt)):
         found |= {("qpos", joint.name): joint.qpos, ("qvel", joint.name): joint.qvel}
@@ -147,9 +148,9 @@ def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[tuple[str, str]
 
 
 class _Tendon(NamedTuple):
-    length: float  # In the model's own pose, m, or of a fixed one the sum of its joints.
-    fits: bool  # Whether the length is within its limits, if it has any.
-    inside: list[bool]  # For each geom that it passes with a side site, whether that is inside.
+    length: float  # In the model's own pose, m; of a fixed tendon, the weighted sum of its joints.
+    fits: bool  # Whether the length is within the tendon's limits; true without limits.
+    inside: list[bool]  # For each wrapped geom with a side site, whether the site is inside it.
 
 
 def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
@@ -164,7 +165,7 @@ def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
             if kind in (int(_W.mjWRAP_SPHERE), int(_W.mjWRAP_CYLINDER)) and side >= 0:
                 place = data.site_xpos[side] - data.geom_xpos[geom]
                 place = data.geom_xmat[geom].reshape(3, 3).T @ place
-                # A cylinder has no ends for a tendon.
+                # For a tendon, a cylinder is infinitely long.
                 reach = place[:2] if kind == _W.mjWRAP_CYLINDER else place
                 inside.append(bool(np.linalg.norm(reach) < model.geom_size[geom, 0]))
         length = float(data.ten_length[i])
@@ -175,7 +176,7 @@ def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
 
 
 def _follow_tendons(spec: mujoco.MjSpec, tendons: dict[str, _Tendon]) -> None:
-    """Refuse tendons whose path has changed its meaning, and fit muscles to their new lengths."""
+    """Refuse tendons that change sides or exceed a limit, and fit muscles to their new lengths."""
     new = _tendons(compiled(spec))
     for name, now in new.items():
         old = tendons.get(name, now)
@@ -222,10 +223,10 @@ def _mark_pins(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
 def _close_loops(
     spec: mujoco.MjSpec, model: mujoco.MjModel, torn: set[Element], keyframes: Keyframes
 ) -> mujoco.MjData:
-    """Move the joints of the model's own pose until all pins and couplings hold that held before.
+    """Move the joints of the model's own pose until no pin or coupling is open, except `torn` ones.
 
-    Positions of hinges and slides keep their meaning, since their references move, and so do those
-    of balls in the keyframes. Return the data of the model in its new pose.
+    References of hinges and slides, and balls in the keyframes, are moved along, so that positions
+    keep their meaning. Return the data of the model in its new pose.
     """
     data = _posed(model)
     for i, key in enumerate(_keys(spec)):
@@ -233,7 +234,7 @@ def _close_loops(
     mujoco.mj_fwdPosition(model, data)
     lengths = np.array(data.ten_length)
     kinds = model.jnt_type
-    # The turn of a ball would be measured from the new pose.
+    # These balls cannot move, because their turn would be measured from the new pose.
     driven = model.actuator_trnid[np.isin(model.actuator_trntype, [int(t) for t in OF_JOINTS]), 0]
     measured = (model.jnt_limited != 0) | (model.jnt_stiffness != 0.0)
     measured |= np.isin(np.arange(model.njnt), driven)
@@ -287,7 +288,7 @@ def _unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
                 own[6:10] = product(orientation(first), OPPOSITE * orientation(second))
         elif together:
             own[:3] = first.pos
-        else:  # One that is switched off, and open: only sites can state both places.
+        else:  # The pin is switched off and open: only sites can state both places.
             for end, site in enumerate((first, second), 1):
                 site.name = free(f"{equality.name or 'pin'}_{end}")
             equality.name1, equality.name2 = first.name, second.name
@@ -301,7 +302,7 @@ def _unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
 
 
 def _posed(model: mujoco.MjModel) -> mujoco.MjData:
-    """Return data in the model's own pose, with the rows of its equalities alone."""
+    """Return data in the model's own pose, with no constraints but equalities."""
     model.opt.disableflags |= _D.mjDSBL_CONTACT | _D.mjDSBL_LIMIT | _D.mjDSBL_FRICTIONLOSS
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(model)
@@ -310,7 +311,7 @@ def _posed(model: mujoco.MjModel) -> mujoco.MjData:
 
 
 def _keys(spec: mujoco.MjSpec) -> list[Element]:
-    # Edits keep the kind of an equality and the first that it names.
+    # Edits change neither the kind of an equality nor the first element that it names.
     return [(COUPLINGS.get(e.type, e.objtype), e.name1) for e in spec.equalities]
 
 
@@ -327,7 +328,7 @@ def _residuals(
 
 
 def _shift_coupling(equality: mujoco.MjsEquality, changes: dict[Element, float]) -> None:
-    """Keep the meaning of a coupling if references have moved, by these changes, rad or m."""
+    """Keep the meaning of a coupling after references have moved by `changes`, rad or m."""
     kind = COUPLINGS.get(equality.type, _O.mjOBJ_UNKNOWN)
     by_follower, by_leader = (changes.get((kind, n), 0.0) for n in (equality.name1, equality.name2))
     if by_follower or by_leader:
@@ -346,7 +347,7 @@ def equality_rows(
 ) -> tuple[NDArray[np.int32], Array, Array]:
     """Return the equality, the violation and the Jacobian (n, nv) of each row of equalities.
 
-    The data have gone through `mj_fwdPosition`.
+    `data` must be up to date with `mj_fwdPosition`.
     """
     ids = data.efc_id[: int(data.ne)]
     rows = np.flatnonzero(np.isin(model.eq_type[ids], _SOLVED))
@@ -363,10 +364,10 @@ def equality_rows(
 def close(
     model: mujoco.MjModel, data: mujoco.MjData, movable: NDArray[np.bool_], most_steps: int
 ) -> float:
-    """Move the pose in `data` to the nearest in which the equalities hold.
+    """Move the pose in `data` to the nearest pose in which the equalities hold.
 
-    Only the `movable` degrees of freedom (nv,) move; hinges and slides stay inside their limits, or
-    get no farther outside. The largest violation that is left is returned, m or rad.
+    Only the `movable` degrees of freedom (nv,) move. Hinges and slides stay inside their limits;
+    those outside get no farther away. The largest remaining violation is returned, m or rad.
     """
     scalar, at_limit = np.flatnonzero(model.jnt_type > int(_J.mjJNT_BALL)), np.zeros(model.nv, bool)
     places, dofs = model.jnt_qposadr[scalar], model.jnt_dofadr[scalar]
@@ -381,7 +382,7 @@ def close(
         step *= min(1.0, _LONGEST_STEP / max(largest(step), _LONGEST_STEP))
         mujoco.mj_integratePos(model, data.qpos, step, 1.0)
         clipped = np.clip(data.qpos[places], low, high)
-        # A joint at its limit is left out of the next step, which the others must make.
+        # A joint at its limit is held in the next step, and only the others move.
         at_limit[dofs] = clipped != data.qpos[places]
         data.qpos[places] = clipped
         mujoco.mj_fwdPosition(model, data)
@@ -389,5 +390,5 @@ def close(
 
 
 def largest(numbers: Array) -> float:
-    """Return the largest absolute value, 0 of none."""
+    """Return the largest absolute value; 0 for an empty array."""
     return float(np.abs(numbers).max(initial=0.0))

@@ -25,12 +25,12 @@ UPRIGHT: Final = np.array([1.0, 0.0, 0.0, 0.0])
 OPPOSITE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 """Factors that make the quaternion of the opposite turn."""
 _QUAT: Final = mujoco.mjtOrientation.mjORIENTATION_QUAT
-_RESOLVER: Final = mujoco.MjSpec()  # The method needs any specification, even an empty one.
-# A joint without limits turns all the way round; a slide without limits has no such number.
+_RESOLVER: Final = mujoco.MjSpec()  # `resolve_orientation` is a method; any specification serves.
+# Range of a hinge without limits, rad. A slide without limits has no range.
 _FULL_TURN: Final = (-math.pi, math.pi)
-# Cosine above which a geom lies along an axis; that of the inverted pendulum leans by 1 mm on 600.
+# Cosine above which a geom lies along an axis; the inverted pendulum's pole leans by 1 mm in 600.
 _ALONG: Final = 0.999
-# Shares of a length that differ by less are the same; rounding must not decide on which side of a
+# Shares of a length that differ by less are equal; rounding must not decide on which side of a
 # cut a point lies.
 _SAME: Final = 1e-9
 
@@ -50,7 +50,7 @@ def product(first: Array, second: Array) -> Array:
 def orientation(element: Any, quat: str = "quat", alt: str = "alt") -> Array:
     """Return the unit quaternion of an element, for any notation of its orientation.
 
-    That of a body's inertia is in the fields `iquat` and `ialt`.
+    For the orientation of a body's inertia, pass `iquat` and `ialt`.
     """
     quaternion, written = getattr(element, quat), getattr(element, alt)
     if written.type == _QUAT:
@@ -105,7 +105,7 @@ def axis_ends(geom: mujoco.MjsGeom) -> Array:
 
 
 def set_ends(geom: mujoco.MjsGeom, ends: Array) -> None:
-    """Give a geom by the ends of its axis, shape (2, 3); MuJoCo takes these or a pose."""
+    """Define a geom by the ends of its axis, shape (2, 3), instead of by a pose."""
     geom.pos = np.zeros(3)
     set_orientation(geom, UPRIGHT)
     geom.fromto = ends.ravel()
@@ -174,7 +174,7 @@ def held_at(body: mujoco.MjsBody) -> Array:
 
 
 def far_end(body: mujoco.MjsBody) -> Array:
-    """Return the point of a segment's axis farthest from its anchor; refuse one without an axis."""
+    """Return the end of a capsule or cylinder that is farthest from a segment's anchor."""
     held = anchor(body)
     ends = [end for geom in body.geoms for end in axis_ends(geom)]
     if not ends:
@@ -206,26 +206,26 @@ def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
 def move_outwards(element: Any, held: Array, factor: float | Array) -> None:
     """Move an element, or its ends, as its segment is stretched; the point `held` stays.
 
-    The factor may be one for each axis of the body.
+    The factor may be an array with one factor for each axis of the body.
     """
     set_points(element, held + factor * (points_of(element) - held))
 
 
 def lengthen(geom: mujoco.MjsGeom, factor: float, axis: int | None) -> None:
-    """Scale the long half-size of a geom, or that along an axis of the body; refuse oblique ones.
+    """Scale the longest half-size of a geom, or the half-size along an axis of the body.
 
-    A geom that is given by its ends has none.
+    A geom oblique to the axis is refused. Spheres and geoms defined by their ends are unchanged.
     """
     if geom.type == _G.mjGEOM_SPHERE or has_ends(geom):
         return  # A sphere has no length.
     place, direction = (1, 2) if geom.type in LONG else (int(np.argmax(geom.size)),) * 2
     if axis is not None:
-        # How much each axis of the geom lies along that of the body.
+        # Cosines between the axes of the geom and the axis of the body.
         along = np.abs(rotation(orientation(geom))[axis])
         if geom.type not in LONG:
             place = direction = int(np.argmax(along))
         if along[direction] < 1.0 - _ALONG:
-            return  # It lies across the axis.
+            return  # The geom lies across the axis.
         if along[direction] < _ALONG:
             raise MorphologyError(
                 f"{geom.name!r} lies oblique to the axis: stretch it along all axes instead."
@@ -255,7 +255,7 @@ def is_limited(element: mujoco.MjsJoint | mujoco.MjsTendon) -> bool:
 def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
     """Return the range of a hinge or slide, rad or m, and refuse other joints.
 
-    It is a full turn for a hinge without limits, None for a slide without.
+    It is a full turn for a hinge without limits, and None for a slide without limits.
     """
     if joint.type not in (_J.mjJNT_HINGE, _J.mjJNT_SLIDE):
         raise MorphologyError(f"{joint.name!r} is neither a hinge nor a slide, so it has no range.")
@@ -283,8 +283,8 @@ def _in_degrees(joint: mujoco.MjsJoint) -> bool:
 def as_written(joint: mujoco.MjsJoint, position: float) -> float:
     """Return a position, rad or m, in the unit of the model.
 
-    MuJoCo converts degrees to exactly this angle if possible, as for every angle that was written
-    in degrees: 30° is not 29.999999999999996°.
+    If possible, the degrees are those that MuJoCo converts to exactly this angle, such as 30° and
+    not 29.999999999999996°.
     """
     if not _in_degrees(joint):
         return position
@@ -349,7 +349,7 @@ class Plane:
         return self._share(middle_of(point)) > 1.0 - _SAME
 
     def piece_of(self, geom: mujoco.MjsGeom) -> NearPart:
-        """Return the part of a geom on the near side; one without a length goes by its middle."""
+        """Return the part of a geom on the near side; a geom without a length has its middle's."""
         ends, axis = self._ends(geom)
         if not len(ends):
             middle = middle_of(geom)
@@ -358,14 +358,14 @@ class Plane:
         inner, outer = self._share(near), self._share(far)
         if outer <= self._part + _SAME or inner >= self._part - _SAME:
             return NearPart(near, float(outer <= self._part + _SAME), axis)
-        # Exact for a geom that spans the segment.
+        # Avoid rounding for a geom that spans the segment.
         if np.allclose(near, self._held, 0.0, _SAME):
             near, inner = self._held, 0.0
         outer = 1.0 if abs(outer - 1.0) < _SAME else outer
         return NearPart(near, (self._part - inner) / (outer - inner), axis)
 
     def _ends(self, geom: mujoco.MjsGeom) -> tuple[Array, int]:
-        """Return both ends of a geom's length, and the index of the half-size that it is."""
+        """Return both ends of a geom along the segment, and the index of the half-size there."""
         if geom.type != _G.mjGEOM_BOX:
             return axis_ends(geom), 1
         if has_ends(geom):

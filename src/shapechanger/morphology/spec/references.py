@@ -31,7 +31,7 @@ PINS: Final = (_E.mjEQ_CONNECT, _E.mjEQ_WELD)
 COUPLINGS: Final = {_E.mjEQ_JOINT: _JOINT, _E.mjEQ_TENDON: _O.mjOBJ_TENDON}
 """Equalities y - y0 = p(x - x0) of a follower y and a leader x, and the kind of both."""
 MARK: Final = "pin~"
-"""Prefix of the sites that stand for the ends of loops while edits are applied."""
+"""Prefix of the sites that replace the ends of pins while edits are applied."""
 
 TARGETS: Final = {
     **dict.fromkeys(OF_JOINTS, _JOINT),
@@ -45,8 +45,8 @@ WRAPS: Final = {
 }
 
 
-# Lists of elements that name others, their fields with names, and the kind of the named elements
-# or a function that returns it; a tuple has one kind for each name.
+# Lists of elements that refer to others by name, their fields with names, and the kind of the named
+# elements or a function that returns it. For a tuple, the function returns one kind for each name.
 _HOLDERS: Final[tuple[tuple[str, str, Callable[[Any], Any] | mujoco.mjtObj], ...]] = (
     ("equalities", "name1 name2", lambda e: e.objtype if e.type in PINS else COUPLINGS.get(e.type)),
     ("excludes", "bodyname1 bodyname2", _BODY),
@@ -61,7 +61,7 @@ _HOLDERS: Final[tuple[tuple[str, str, Callable[[Any], Any] | mujoco.mjtObj], ...
     ("flexes", "vertbody nodebody", _BODY),
     ("tuples", "objname", attrgetter("objtype")),
 )
-# Sensors of all geoms of a body, so of both parts after a split.
+# Sensors that can read all geoms of a body, and would need both parts after a split.
 _OF_ALL_GEOMS: Final = (
     *(_S.mjSENS_GEOMDIST, _S.mjSENS_GEOMNORMAL, _S.mjSENS_GEOMFROMTO, _S.mjSENS_CONTACT),
 )
@@ -71,8 +71,8 @@ class Mention(NamedTuple):
     """One element of a model, the holder, that names another."""
 
     holder: Any
-    field: str  # Field of the holder that has the name; `path` of a tendon.
-    element: Element  # The named one.
+    field: str  # Field of the holder that contains the name; `path` for a tendon.
+    element: Element  # The element that is named.
 
     @property
     def kind(self) -> str:
@@ -88,7 +88,7 @@ class Mention(NamedTuple):
 def mentions(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     """Return every reference to an element of a body, a tendon or an actuator.
 
-    `kinds` such as "actuator" are the holders', by default all.
+    `kinds` selects kinds of holders, such as "actuator"; by default all.
     """
     found = [
         Mention(tendon, "path", key) for tendon in spec.tendons for key in path_elements(tendon)
@@ -121,13 +121,13 @@ def key_of(element: Any) -> Element:
 
 
 def parts_of(element: Any) -> list[Any]:
-    """Return all that hangs on a body itself, limbs last; nothing hangs on other elements."""
+    """Return the elements directly on a body, child bodies last; [] for another element."""
     kinds = ("joints", "geoms", "sites", "cameras", "lights", "bodies")
     return [part for kind in kinds for part in getattr(element, kind, ())]
 
 
 def whole(element: Any) -> Iterator[Any]:
-    """Yield an element and, of a limb, all that hangs on it, parents first."""
+    """Yield an element and everything attached to it, parents first."""
     yield element
     for part in parts_of(element):
         yield from whole(part)
@@ -159,7 +159,7 @@ def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Elem
     staying = {*path_elements(tendon)} - elements
     if any(kind == _JOINT for kind, _ in staying):
         return False
-    carriers = set[str]()  # If one, all points elsewhere are on bodies fixed to each other.
+    carriers = set[str]()  # If there is one, all other points are on bodies fixed to each other.
     for kind, name in staying:
         body = (spec.site(name) if kind == _SITE else spec.geom(name)).parent
         while body.parent is not None and not body.joints:
@@ -169,14 +169,14 @@ def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Elem
 
 
 def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
-    """Return whether a tendon acts or is used; the humanoid's do neither."""
+    """Return whether a tendon exerts a force, is limited or is referred to."""
     forces = (tendon.stiffness, tendon.damping, tendon.frictionloss, tendon.armature)
     used = any(each.element == key_of(tendon) for each in mentions(spec))
     return is_limited(tendon) or any(map(np.any, forces)) or used
 
 
 def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool = True) -> None:
-    """Remove the skins over bodies that change, without effect, and refuse parts of a flex."""
+    """Remove skins over changed bodies, which have no physical effect; refuse parts of a flex."""
     gone: dict[str, Any] = {}
     for mention in mentions(spec, "flex", "skin"):
         if mention.element in touched:
@@ -191,9 +191,9 @@ def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool 
 
 
 def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str) -> None:
-    """Refuse to change an element that another names, by some kinds of references or by any.
+    """Refuse to change an element that another element names; `kinds` limits the other's kinds.
 
-    `why` ends the sentence on the element, such as "lies beyond the cut".
+    `why` completes a sentence that begins with the element, such as "lies beyond the cut".
     """
     for mention in mentions(spec, *kinds):
         if mention.element == element:
@@ -212,19 +212,19 @@ def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[s
         whole = mention.kind == "actuator" or mention.holder.type in _OF_ALL_GEOMS
         if whole and mention.element == key_of(body):
             raise MorphologyError(
-                f"{body.name!r} cannot be split: {mention} is about all of its geoms."
+                f"{body.name!r} cannot be split: {mention} needs all of its geoms on one body."
             )
 
 
 def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
-    """Refuse to remove a limb with the actuators or tendons of an element elsewhere."""
+    """Refuse to remove a limb that tendons, couplings or actuators of other limbs need."""
     gone = elements_of(limb)
     for tendon in spec.tendons:
         if gone.isdisjoint(path_elements(tendon)):
             continue
         if not moves_only(spec, tendon, gone) and _does_something(spec, tendon):
             raise MorphologyError(
-                f"The tendon {tendon.name!r} also moves what stays when {limb.name!r} is removed: "
+                f"The tendon {tendon.name!r} also moves bodies that stay without {limb.name!r}: "
                 "remove or reroute the tendon first."
             )
         gone.add(key_of(tendon))
@@ -245,7 +245,7 @@ def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
 
 
 def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
-    """Remove a limb with all that has no meaning without it.
+    """Remove a limb with all elements that have no meaning without it.
 
     Motors, sensors, exclusions, contact pairs, pins and followers go with the limb, and so do the
     tendons that move it alone. Cameras and lights that aim at it aim at the body that carried it.
@@ -259,7 +259,7 @@ def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
     for group in spec.tuples:
         members = zip(group.objtype, group.objname, group.objprm, strict=True)
         kept = [member for member in members if (_plain(_O(member[0])), member[1]) not in gone]
-        if 0 < len(kept) < len(group.objname):  # MuJoCo deletes one that loses any, as it is.
+        if 0 < len(kept) < len(group.objname):  # MuJoCo deletes a tuple that still names the limb.
             group.objtype, group.objname, group.objprm = map(list, zip(*kept, strict=True))
     spec.delete(limb)
 
@@ -298,7 +298,7 @@ def remove_joint(
 
 
 def _hold(spec: mujoco.MjSpec, kind: mujoco.mjtEq, name: str, locked: float) -> None:
-    """Hold the elements coupled to a joint or tendon that is `locked`, rad or m, from reference."""
+    """Hold elements coupled to a joint or tendon locked this far from its reference, rad or m."""
     for equality in [e for e in spec.equalities if e.type == kind and name in (e.name1, e.name2)]:
         leader, polynomial = equality.name2, np.array(equality.data[:5])
         # For an equality of one element, only the constant counts.
