@@ -300,7 +300,7 @@ def test_velocity_servos_have_a_unit(dog: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "error", "sentence"),
     [
-        ({"path": ""}, EnvArgumentError, "needs the file of a robot, as path=FILE"),
+        ({"path": ""}, EnvArgumentError, "needs the file of a robot: give path=FILE"),
         ({"task": "wlak"}, UnknownName, "Did you mean 'walk'"),
         ({"tsk": "walk"}, UnknownName, "No argument of dog matches 'tsk'. Did you mean 'task'"),
         ({"body": "cat"}, UnknownName, "No body of the family dog matches 'cat'"),

@@ -160,7 +160,7 @@ def test_a_task_names_what_it_observes() -> None:
     assert observed(as_task("walk")[0]) is None
     for wrong in ("torso/z", (), [3]):
         task.observe = wrong  # type: ignore[attr-defined]
-        with pytest.raises(TaskError, match="`observe` is a list of names or globs"):
+        with pytest.raises(TaskError, match="`observe` must be a list of names or globs"):
             observed(task)
 
 

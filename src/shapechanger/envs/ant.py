@@ -53,7 +53,7 @@ _EXTENDED_START_HEIGHT_M: Final = 1.25
 
 
 def _foot(leg: int, gear: float | None) -> tuple[AddSegment, JointRange]:
-    """A third segment on a leg, with a motor of this gear, N·m, or without."""
+    """Return the edits that add a third segment to a leg; gear in N·m, None for no motor."""
     end = (LEGS[leg][0] * _FOOT_REACH_M, LEGS[leg][1] * _FOOT_REACH_M, 0.0)
     return (
         AddSegment(f"shank_{leg}", f"foot_{leg}", end, *_range(leg, _FOOT_RANGE_DEG), gear),
@@ -62,13 +62,13 @@ def _foot(leg: int, gear: float | None) -> tuple[AddSegment, JointRange]:
 
 
 def _extended(gear: float | None) -> Body:
-    """Ant with a third segment on each leg, with motors of this gear, N·m, or without."""
+    """Return the ant with a third segment on each leg; gear in N·m, None for no motors."""
     feet, ankles = zip(*(_foot(leg, gear) for leg in LEGS), strict=True)
     return (*feet, *ankles, StartHeight("torso", _EXTENDED_START_HEIGHT_M))
 
 
 def _range(leg: int, degrees: tuple[float, float]) -> tuple[float, float]:
-    """Range of a leg's joint, rad, from the range of the legs that turn forwards, degrees."""
+    """Return the range of a leg's joint, rad, from the range for forward-turning legs, degrees."""
     lower, upper = map(math.radians, degrees)
     return (-upper, -lower) if leg in _TURNS_BACK else (lower, upper)
 
@@ -99,8 +99,8 @@ ANT: Final = Family(
 )
 
 
-# An ant this many times higher than it stands has been thrown up. This gives Ant a ceiling of 0.98
-# m, where Gymnasium has 1.0, and BigAnt a ceiling of 1.80 m, where the release of 2017 had 2.0.
+# An ant above this multiple of its standing height has been thrown up. The limit of Ant is 0.98 m,
+# Gymnasium's is 1.0; the limit of BigAnt is 1.80 m, the original release's (2017) was 2.0.
 _HIGHEST_STANDS: Final = 1.9
 # All ants start at 0.75 m, and small ants fall from there: they must stay healthy until they land.
 _HIGHEST_STARTS: Final = 1.3
@@ -196,10 +196,10 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     joints stay inside their limits and feet above the floor.
 
     ## End
-    Terminated when the ant is unhealthy: its torso's up axis points down, it is higher than 1.9
-    times its own standing height and 1.3 times its start, or its state is not finite. A lower limit
-    could not distinguish a flipped ant, which rests at 0.27 m, from one that lies down. Truncated
-    after 1,000 steps.
+    Terminated when the ant is unhealthy: its torso's up axis points down, it is higher than both
+    1.9 times its standing height and 1.3 times its start height, or its state is not finite. There
+    is no lower limit, because an ant that lies down is as low as a flipped one, which rests at
+    0.27 m. Truncated after 1,000 steps.
 
     ## Info
     `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
@@ -256,8 +256,8 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         return self._main_body
 
     def _advance(self, bound: _Ant, action: Any) -> StepResult:
-        # Gymnasium's `step`, `_get_obs` and `is_healthy`, each number computed once, in their order
-        # and precision: the cost of an action is summed in the action's own.
+        # Gymnasium's `step`, `_get_obs` and `is_healthy` with each number computed once, in their
+        # order and precision. The cost of an action is summed in the precision of the action.
         if type(action) is not np.ndarray or action.shape != bound.shape:
             action = check_action(self, action)
         ctrl_cost = self._ctrl_cost_weight * _sum(np.square(action), axis=None)
@@ -295,7 +295,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     def _reward(
         self, place: Any, velocity: Any, ctrl_cost: Any, contact_cost: Any, healthy: Any
     ) -> tuple[Any, dict[str, Any]]:
-        """Return reward and info as Gymnasium's `_get_rew`, of one ant or of a row of ants.
+        """Return reward and info as Gymnasium's `_get_rew`, for one ant or an array of ants.
 
         The place is the torso's, x, y and distance from the origin, m; the velocity is the main
         body's along x and y, m/s.
@@ -328,7 +328,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             *(self._forward_reward_weight, self._healthy_reward),
             *(self._ctrl_cost_weight, self._contact_cost_weight),
         )
-        # Keep the types of the numbers, so that results have equal types and representations.
+        # `repr` distinguishes types of numbers, because the types of the results depend on them.
         return sys.intern(repr(shared))
 
     def conclude(
@@ -356,7 +356,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         with np.errstate(over="ignore", invalid="ignore"):  # Python numbers do not warn either.
             velocity = (main_xy - main_xy_before) / one.dt
             upright = is_upright(after[:, 2], after[:, 4], after[:, 5], low, high)
-            # Rounded as `dot` rounds, which need not be as NumPy rounds a sum of products.
+            # `vecdot` rounds as `dot` does; a sum of products may round differently.
             distance = np.sqrt(np.vecdot(place, place))
         healthy = upright & np.isfinite(state).all(axis=1)
         where = place[:, 0], place[:, 1], distance

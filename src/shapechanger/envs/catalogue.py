@@ -42,10 +42,10 @@ def _variants(suffix: str, summary: str) -> Mapping[str, tuple[str, str]]:
     }
 
 
-RANGES_ENVS: Final = _variants("Ranges", "the same, seeing distances; fast")
+RANGES_ENVS: Final = _variants("Ranges", "the same task with distances instead of images; fast")
 """Vehicle and summary, keyed by id, for the same task with distances instead of images."""
 
-WAYPOINT_ENVS: Final = _variants("Waypoint", "camera and action the same for all")
+WAYPOINT_ENVS: Final = _variants("Waypoint", "camera and action are the same for all vehicles")
 """Vehicle and summary, keyed by id, for the same task with waypoints as actions."""
 
 
@@ -190,7 +190,7 @@ def register_all() -> None:
         (REMOTE_VEHICLE, "robot.client.env:RemoteVehicleEnv", None),
         (REMOTE_WAYPOINT, "vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):
-        _register(env_id, f"shapechanger.{entry_point}", steps, nondeterministic=True)  # A robot.
+        _register(env_id, f"shapechanger.{entry_point}", steps, nondeterministic=True)  # Hardware.
 
 
 def _register(env_id: str, entry_point: str, steps: int | None = 1000, **more: Any) -> None:

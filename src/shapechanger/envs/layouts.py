@@ -150,7 +150,7 @@ def _servo_unit(model: mujoco.MjModel, actuator: int, kind: mujoco.mjtJoint | No
 
 
 def _joints(model: mujoco.MjModel) -> Iterator[tuple[mujoco.mjtJoint, Element, int]]:
-    """Yield kind, number and name of each joint; free and ball joints have their body's name."""
+    """Yield the kind, element and index of each joint; free and ball joints are named by body."""
     for j in range(model.njnt):
         kind, body = _J(model.jnt_type[j]), model.body(model.jnt_bodyid[j]).name
         is_axis = kind in _POSITION_UNIT

@@ -83,11 +83,11 @@ def make_vec(
         nconmax: With the backend `warp`: number of contacts that a world has memory for. None for
             the largest possible number; steps are faster with less memory, and a warning is given
             if a world has more contacts.
-        njmax: The same for rows of constraints.
+        njmax: Number of rows of constraints that a world has memory for; otherwise as `nconmax`.
         task_infos: With the backend `warp`: whether steps return the infos of the CPU env, which
             take time and are not used by learners.
         autoreset_mode: When to reset an env whose episode has ended, see Gymnasium; None for
-            `NEXT_STEP` with threads, and for `SAME_STEP`, the only mode there, on a device.
+            `NEXT_STEP` with threads, and for `SAME_STEP` on a device, which has no other mode.
         copy: Whether to return copies of the observations; otherwise the next step overwrites them.
             On a device, observations are always copies.
         **arguments: Arguments of `gymnasium.make`, such as `render_mode` or `max_episode_steps`.

@@ -42,7 +42,7 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
     try:
         full = find_task(env_id) or find(env_id).id
     except UnknownName:
-        # Third-party envs count too, as `module:id` or once registered; `make` checks again.
+        # Accept third-party envs, as `module:id` or if registered; `make` checks them again.
         if not _IN_MODULE.fullmatch(env_id) and env_id not in gym.registry:
             raise
         allow_own_modules(env_id)

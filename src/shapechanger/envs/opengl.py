@@ -13,13 +13,13 @@ from typing import Any, Final
 from shapechanger.errors import RenderError
 
 _LIBRARIES: Final = ("egl", "osmesa", "glfw")
-# Other values of MUJOCO_GL, for GLFW or for no drawing; with any other MuJoCo does not load.
+# Other values of MUJOCO_GL, for GLFW or for no drawing; MuJoCo cannot be imported with any other.
 _OTHER_VALUES: Final = (
     *("", "enable", "enabled", "on", "true", "1", "glx", "wgl", "cgl"),
     *("disable", "disabled", "off", "false", "0"),
 )
 
-_PROBE: Final = 16  # Width and height of a window that is only a test, pixels.
+_PROBE: Final = 16  # Width and height of an invisible test window, pixels.
 
 
 def has_screen() -> bool:
@@ -40,10 +40,10 @@ def require_screen() -> None:
 
 
 def choose_gl() -> None:
-    """Set `MUJOCO_GL` to EGL or OSMesa if there is no screen and it is not set.
+    """Set `MUJOCO_GL` to EGL or OSMesa if it is not set and there is no screen.
 
     Raises:
-        RenderError: If neither is installed, or it is set to a value with which nothing is drawn.
+        RenderError: If neither is installed, or if the value of `MUJOCO_GL` disables drawing.
     """
     chosen = os.environ.get("MUJOCO_GL", "")
     if chosen and chosen not in _LIBRARIES:
@@ -68,13 +68,13 @@ def require_known_gl() -> None:
 
 
 def open_context(width: int, height: int) -> Any:
-    """Open a context for drawing without a window, of some pixels, and make it current.
+    """Open a context for drawing without a window, of this size in pixels, and make it current.
 
-    `mujoco.GLContext` follows `MUJOCO_GL` when MuJoCo was imported; this follows its present
-    value. MuJoCo's own errors are late and of many kinds, and GLFW reports none.
+    `mujoco.GLContext` uses the value that `MUJOCO_GL` had when MuJoCo was imported; this function
+    uses the present value. MuJoCo raises errors late and of many kinds, and GLFW raises none.
 
     Raises:
-        RenderError: If none opens.
+        RenderError: If no context can be opened.
     """
     library = os.environ.get("MUJOCO_GL") or "glfw"
     if library == "glfw":

@@ -91,7 +91,7 @@ class OwnFamily(Family):
     """The bodies that edits make from a user's robot.
 
     Attributes:
-        path: The file; the family is the same only for the same file and rig.
+        path: The file. Families are the same only if file and rig are the same.
     """
 
     path: Path = Path()
@@ -105,7 +105,7 @@ class OwnFamily(Family):
         """Load a model with the rig, and name all its elements.
 
         A file that a URDF names as `package://NAME/REST` is searched in each folder NAME that
-        contains the URDF, or lies next to such a folder.
+        contains the URDF, or that lies next to a folder that contains the URDF.
 
         Raises:
             BrokenModel: If MuJoCo cannot read or compile it, or no folder has a file of a package.
@@ -237,9 +237,9 @@ class OwnRobotEnv(Reshapable, EzPickle):
 
     Attributes:
         task: The task.
-        task_name: Its name.
+        task_name: Name of the task.
         measures: Metrics of a policy, the default first.
-        reset_noise_scale: As given.
+        reset_noise_scale: The argument of this name.
     """
 
     # `gym.make` reads the modes from the class; the rate of the frames depends on the model.
@@ -262,7 +262,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         **arguments: Any,
     ) -> None:
         if not str(path):
-            raise EnvArgumentError(f"{OWN_ROBOT} needs the file of a robot, as path=FILE.")
+            raise EnvArgumentError(f"{OWN_ROBOT} needs the file of a robot: give path=FILE.")
         self.task, self.task_name = as_task(task, task_options)
         self._observed = observed(self.task)
         self.measures = getattr(self.task, "measures", (RETURN,))
@@ -318,7 +318,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
                     pose[at] = home[at]
             # Lift the robot to the floor, in case an edit has enlarged it.
             pose = StartRules(model).feasible(pose, mujoco.MjData(model), pose)
-        # Many legs are folded if joints are in the middle of their ranges.
+        # Measured in the start pose, because joints in the middle of their ranges fold many legs.
         height, trunk = standing_height(model, pose), travelling_body(model)
         if height is None and trunk is not None and trunk_lift(model) is None:
             # For example a base on wheels that slides in a plane: it keeps its height.
@@ -355,7 +355,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return [features[place] for place in places]
 
     def step(self, action: Any) -> Any:
-        """Take one step, as `Reshapable.step`, and ask the task for its reward and end."""
+        """Take one step, as `Reshapable.step`, with the task's reward and end."""
         action = check_action(self, action)
         self._require_reset("step")
         before = self.trunk_place()
@@ -456,7 +456,7 @@ def from_mjcf(
     max_episode_steps: int = 1000,
     **arguments: Any,
 ) -> gym.Env[Any, Any]:
-    """Make an env of your robot and task; `gymnasium.make` makes the same.
+    """Make an env of your robot and task; `gymnasium.make` makes the same env.
 
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as

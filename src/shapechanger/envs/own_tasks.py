@@ -234,7 +234,7 @@ def reward_terms(task: OwnTask, name: str, robot: RobotState) -> dict[str, float
 
 
 def has_ended(task: OwnTask, name: str, robot: RobotState) -> bool:
-    """Return whether a task ends the episode; raise a TaskError unless it says true or false."""
+    """Return whether a task ends the episode; raise a TaskError unless it returns a boolean."""
     terminated: Any = getattr(task, "terminated", None)
     answer: Any = terminated is not None and terminated(robot)
     if not isinstance(answer, bool | np.bool_):
@@ -253,5 +253,5 @@ def observed(task: OwnTask) -> Sequence[str] | None:
     given: Any = getattr(task, "observe", None)
     names: list[Any] = [] if given is None or isinstance(given, str) else list(given)
     if given is not None and not (names and all(isinstance(each, str) for each in names)):
-        raise TaskError(f"`observe` is a list of names or globs of numbers, got {given!r}.")
+        raise TaskError(f"`observe` must be a list of names or globs of numbers, got {given!r}.")
     return names or None

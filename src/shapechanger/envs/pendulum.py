@@ -57,8 +57,8 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
 ):
     """Balance a pole on a cart: Gymnasium's `InvertedPendulum-v5` with any body of its family.
 
-    The paper's bodies are "SmallInvertedPendulum" and "BigInvertedPendulum", with a pole half and
-    twice as long.
+    The bodies "SmallInvertedPendulum" and "BigInvertedPendulum" have poles half as long and twice
+    as long.
 
     ## Action space
     `Box(-3, 3, (1,), float32)`: the force on the cart divided by the motor's gear of 100 N. An
@@ -251,5 +251,5 @@ def _foot_and_length(model: mujoco.MjModel) -> tuple[float, float]:
             return foot, length
     raise MorphologyError(
         "A double pendulum needs a cart on a slide, two poles on hinges and a tip above them: its "
-        "observation and its reward count on these."
+        "observation and its reward depend on these."
     )

@@ -227,14 +227,14 @@ def _geoms(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[_Floats, _Floats
 # Brightness of the headlight for models without lights; its default is dim.
 _HEADLIGHT: Final = [0.5] * 3
 _BACKGROUND: Final = [235 / 255.0] * 3
-# Geoms of the groups 3 to 5 are not drawn unless a viewer asks for them.
+# Geoms of the groups 3 to 5 are not drawn unless a viewer enables these groups.
 _HIDDEN_GROUP: Final = 3
 _DARK_TILE: Final = [0.42, 0.45, 0.48]
 _LIGHT_TILE: Final = [0.54, 0.57, 0.6]
-# Ambient light and light of lamps, in models with lamps; shadows have ambient light only.
+# Ambient light, and diffuse light of each light of a model; shadows have ambient light only.
 _AMBIENT: Final = [0.3] * 3
 _DIFFUSE: Final = [0.7] * 3
-# Higher than any body of the catalogue reaches, m.
+# Least height of a directional light, m, above all bodies of the catalogue.
 _LIGHT_HEIGHT_M: Final = 4.0
 # Half the width of shadow maps, in extents of the model.
 _SHADOW_CLIP: Final = 0.3

@@ -73,8 +73,8 @@ class Reshapable(MujocoEnv):
     - `fast_model`: whether a cheaper model with bit-equal motion may step the physics, while
       MuJoCo's profiling clock (`data.timer`) is paused. Ants and pendulums have such a model;
       other envs accept the argument and ignore it.
-    - `towards`: another body of the family with the same spaces. Each reset then draws the body
-      uniformly between `body` and it, unless the reset gives a body.
+    - `towards`: another body of the family with the same spaces. Each reset then draws a body
+      uniformly between `body` and `towards`, unless the reset gives a body.
 
     Attributes:
         family: The bodies that the env can have.
@@ -93,18 +93,18 @@ class Reshapable(MujocoEnv):
     standing_height: float | None
     _spec: EnvSpec | None = None
     fast_model: bool = True
-    # Arguments that may be objects, and whose record for pickling is JSON.
+    # Arguments that may be objects; they are recorded as JSON for pickling.
     _as_json: frozenset[str] = frozenset()
-    _draws_bare_floors: bool = False  # Planes without a material.
-    _started: bool = False  # A state has been set since the env was made.
-    _starting: bool = False  # A start state is being drawn.
+    _draws_bare_floors: bool = False  # Whether planes without a material are drawn.
+    _started: bool = False  # Whether a state has been set since the env was made.
+    _starting: bool = False  # Whether a start state is being drawn.
 
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
         """Prepare what Gymnasium's constructor needs to compile the model.
 
         Args:
             body: The body to compile.
-            arguments: Arguments of the env; those that Gymnasium does not know are removed.
+            arguments: Arguments of the env; those that Gymnasium's env lacks are removed.
 
         Raises:
             UnknownName: If an argument or the body does not exist.
@@ -320,7 +320,7 @@ class Reshapable(MujocoEnv):
         if not camera and trunk is not None:
             camera = {"distance": _FOLLOWING_PER_REACH * self.reach, "elevation": -20.0}
         elif not camera:
-            # Gymnasium's distance fits its pole: a longer one would be cut off.
+            # At Gymnasium's distance, a longer pole would be cut off.
             default = cast("dict[str, Any]", self.mujoco_renderer.default_cam_config or {})
             distance = max(default.get("distance", 0.0), _FIXED_PER_REACH * self.reach)
             camera = {"distance": distance, "lookat": self.model.body(1).pos.tolist()}

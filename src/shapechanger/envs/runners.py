@@ -44,7 +44,7 @@ from shapechanger.morphology.pose import standing_height, start_pose, trunk_lift
 
 
 def _runner(name: str, legs: Mapping[str, tuple[str, str, str]]) -> Family:
-    """Family of runners in a plane: legs of thigh, shank and foot, which edits can shorten."""
+    """Return a family of runners in a plane, with legs of thigh, shank and foot to be shortened."""
     limbs = [limb for leg in legs.values() for limb in leg]
     return Family(
         name,

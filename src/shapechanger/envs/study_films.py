@@ -43,7 +43,7 @@ class _Scene(NamedTuple):
     env: EnvRef
     act: Act
     body_map: BodyMap | None
-    drives: bool = False  # A vehicle's env renders its camera, so it is filmed from outside.
+    drives: bool = False  # Whether a vehicle drives: its env renders its camera; film from outside.
 
 
 def film_study(
@@ -58,7 +58,7 @@ def film_study(
 
     Args:
         study: The study.
-        folder: Its folder.
+        folder: Folder of the study.
         film: File of a film of all scenes side by side; None for no film.
         source_policy: File of the source policy; None for the policy of the study.
         shadows: Whether frames have shadows.
@@ -157,7 +157,7 @@ def _play(
             return parts.mean(axis=(1, 3)).astype(np.uint8)
 
         if scene.drives and not hasattr(inner, "world"):
-            return [], 0.0, ""  # A robot.
+            return [], 0.0, ""  # A real robot cannot be filmed.
         hold_out(env)
         fps = float(env.metadata["render_fps"])
         measure = measures_of(env)[0]

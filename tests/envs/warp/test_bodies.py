@@ -164,7 +164,7 @@ def test_bodies_of_other_shapes_form_batches() -> None:
     assert envs.observation_space.contains(tuple(part.numpy() for part in observations))
     with pytest.raises(BadAction, match="a sequence of 2 tensors, one per batch"):
         envs.step(torch.zeros(3, 8))
-    with pytest.raises(BadAction, match=r"actions of batch 1 are numbers of shape \(1, 8\)"):
+    with pytest.raises(BadAction, match=r"actions of batch 1 must be numbers of shape \(1, 8\)"):
         envs.step([torch.zeros(2, 12), torch.zeros(2, 8)])
     envs.close()
 

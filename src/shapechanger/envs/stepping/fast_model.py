@@ -10,9 +10,9 @@ Four parts of MuJoCo's step take time without changing any number of an ant or a
 - **Collisions** of models without possible collisions, such as a pendulum.
 - **Springs, joint friction, sensors and equalities** of a model that has none.
 
-Two checks decide whether they are left out: rules on the model, which keep every pair that the
-original could ever generate, and then a test that steps both models side by side. A model for which
-either fails has no fast model.
+Two checks decide whether these parts are left out: rules on the model, which keep every pair that
+the original could ever generate, and then a test that steps both models side by side. If either
+check fails, there is no fast model.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ def find_fast_model(
         make_spec: Returns the spec that the model was compiled from.
 
     Returns:
-        The fast model; None if none is known to move equally.
+        The fast model; None if no cheaper model is known to move equally.
     """
-    # Others may have constraints in several trees, or elements that the rules do not cover.
+    # Other models may have constraints in several trees, or elements that the rules do not cover.
     if (
         model.ntree != 1
         or model.opt.enableflags
@@ -128,8 +128,8 @@ _OF_CONTACTS: Final = (
 _STARTS: Final = 6
 _STEPS: Final = 8
 _SEED: Final = 20170706
-# Spread of random poses, as a fraction of a joint's range, or rad and m without one; and standard
-# deviation of velocities, rad/s and m/s.
+# Spread of random poses, as a fraction of a joint's range, or rad and m for a joint without limits;
+# and standard deviation of velocities, rad/s and m/s.
 _POSE: Final = 0.5
 _SPEED: Final = 3.0
 # Depth of the trunk below the floor, so that every geom touches it, and height of a throw, m.

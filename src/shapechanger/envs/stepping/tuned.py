@@ -164,8 +164,8 @@ class Binding:
         shape: Shape of an action.
         dt: Duration of a step while the model is unedited, s.
         warnings: View of MuJoCo's counts of bad positions, velocities and accelerations, (3,).
-        kind: Envs with the same kind are concluded together; empty for an env that steps by
-            itself, None until it is known. It is renewed after each reset.
+        kind: One call of `conclude` serves all envs of the same kind; empty for an env that must
+            step by itself, None until it is known. It is renewed after each reset.
     """
 
     def __init__(self, watch: ModelWatch, env: TunedStep) -> None:
@@ -249,7 +249,7 @@ class TunedStep(Reshapable):
             self._bound.kind = None
 
     def render(self) -> Any:
-        """Return a frame, or None where a window shows it.
+        """Return a frame, or None if a window shows it.
 
         Raises:
             ResetNeeded: If the env has not been reset.
@@ -272,13 +272,13 @@ class TunedStep(Reshapable):
         return super().step(action) if bound is None else self._advance(bound, action)
 
     def ready_together(self) -> Any:
-        """Return the binding for a step together with other envs; None if `step` must do it.
+        """Return the binding for a step together with other envs; None if `step` must be called.
 
         Raises:
             ResetNeeded: If the env has not been reset.
         """
         if type(self).step is not TunedStep.step or "step" in vars(self):
-            return None  # Overridden.
+            return None  # `step` is overridden.
         bound = self._ready()
         if bound is None:
             return None
@@ -287,9 +287,9 @@ class TunedStep(Reshapable):
         return bound if bound.kind else None
 
     def _kind_of(self, bound: Any) -> str:
-        """Describe all that `conclude` takes from one env for all; empty to step by itself.
+        """Return a key of the numbers that `conclude` reads once for all envs; "" to step alone.
 
-        What `conclude` takes from each env is updated in the binding.
+        Numbers that `conclude` reads for each env are updated in the binding.
         """
         return ""
 
@@ -315,7 +315,7 @@ class TunedStep(Reshapable):
         raise NotImplementedError
 
     def _ready(self) -> Any:
-        """Return the binding to step with; None where Gymnasium's methods must step."""
+        """Return the binding to step with; None if Gymnasium's methods must step."""
         bound = self._bound
         if (
             bound is None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# First, because it names a package that is missing.
+# Imported first, because its error names the package that is missing.
 from shapechanger.envs.warp.devices import find_device
 from shapechanger.envs.warp.env import WarpVectorEnv
 from shapechanger.envs.warp.reader import make_reader

@@ -65,7 +65,7 @@ def device_body(name: str, model: mujoco.MjModel, constants: Rows) -> DeviceBody
             elif isinstance(kind, wp.array):
                 array = getattr(owner, field.name).numpy()
                 is_row = kind.shape[0] == "*"
-                if key == ARMS:  # A pulley's divisor takes the place of the arms.
+                if key == ARMS:  # For a pulley, this array contains the divisor.
                     is_row = bool((model.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT).all())
                 if is_row:
                     rows[key] = array

@@ -91,7 +91,7 @@ def _streams(count: int, device: str) -> list[torch.cuda.Stream]:
 
 
 def at_once(calls: Sequence[Callable[[], _Result]], device: str) -> list[_Result]:
-    """Return the result of each call, of which none occupies a GPU alone; on a CPU, one by one."""
+    """Return the result of each call; a GPU runs them concurrently, a CPU one after another."""
     if len(calls) == 1 or device == "cpu":
         return [call() for call in calls]
     current = torch.cuda.current_stream(device)

@@ -51,7 +51,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     of the world and on how many episodes it has begun since then, and on nothing else. The body
     that a world draws from a pool depends on the same two numbers.
 
-    A step asks the device one question, whether all actions are finite, and copies nothing to it.
+    A step waits for the device once, to check that actions are finite, and copies nothing to it.
 
     Args:
         reader: Compiles bodies.
@@ -71,7 +71,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         episode_steps: Steps of each world's episode so far, shape (n,); it may be written.
         observation_layout: Name, unit and range of each number of an observation of the first
             batch.
-        action_layout: The same of an action.
+        action_layout: Name, unit and range of each number of an action of the first batch.
     """
 
     observation_space: gym.Space[Any]
@@ -295,7 +295,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             given = cast("Sequence[Any]", actions if isinstance(actions, list | tuple) else ())
             if len(given) != len(self.batches):
                 raise BadAction(
-                    f"Actions are a sequence of {len(self.batches)} tensors, one per batch, "
+                    f"Actions must be a sequence of {len(self.batches)} tensors, one per batch, "
                     "because the action spaces of the batches differ."
                 )
             each = [
@@ -319,7 +319,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             raise BadAction(f"The actions{which} must be a tensor or an array: {error}.") from error
         if tuple(tensor.shape) != shape or tensor.dtype == torch.bool or tensor.is_complex():
             raise BadAction(
-                f"The actions{which} are numbers of shape {shape}, got {tensor.dtype} of shape "
+                f"The actions{which} must be numbers of shape {shape}, got {tensor.dtype} of shape "
                 f"{tuple(tensor.shape)}."
             )
         return tensor.to(torch.float32)

@@ -1,7 +1,7 @@
 """Warp kernels: random numbers of worlds, and replacements of functions of mujoco-warp.
 
 A world's random numbers are a function of its seed and episode alone, not of its place in a batch
-or of the number of worlds, and a GPU draws the numbers of the CPU, up to the rounding of its
+or of the number of worlds, and a GPU draws the same numbers as the CPU, up to the rounding of its
 logarithm and cosine. They come from SplitMix64 as a function of a counter (Steele, Lea and Flood,
 OOPSLA 2014), with 53 bits each.
 
@@ -11,7 +11,7 @@ Two private functions of mujoco-warp 4.0 differ from MuJoCo or ignore differing 
   the capsule. mujoco-warp does so only where the capsule leans by more than 30 degrees from the
   plane's normal, and along the world's axes for steeper ones, which turns the pyramid by up to 45
   degrees: an ant's step with a steep shank on the floor then differs by a third in some velocities.
-  With elliptic cones, whose friction has no direction, both agree to 1e-5, so only this differs.
+  With elliptic cones, whose friction has no direction, both agree to 1e-5.
 - **Moment arms.** mujoco-warp keeps the arms of fixed tendons, `wrap_prm`, once for all worlds.
 
 Both are replaced only in the version that the replacements were written for; a test in
@@ -32,7 +32,7 @@ from shapechanger.envs.warp.devices import as_warp, mjw, on, wp
 from shapechanger.errors import VectorEnvError
 
 VERSION: Final = "4.0."
-"""Beginning of the versions of mujoco-warp that these functions belong to."""
+"""Prefix of the versions of mujoco-warp that these functions were written for."""
 
 _core: Any = mjw._src.collision_primitive_core
 plane_sphere: Any = _core.plane_sphere
@@ -132,7 +132,7 @@ def plane_capsule(
     capsule_radius: float,
     capsule_half_length: float,
 ):
-    """Return distances, places and frame of the contacts of both ends; see mujoco-warp's own."""
+    """Return distances, places and frame of the contacts of both ends, like mujoco-warp's own."""
     n = plane_normal
     b, b_norm = normalize_with_norm(capsule_axis - n * wp.dot(n, capsule_axis))
     if b_norm < 1.0e-6:  # Upright, so that any direction will do.
@@ -180,7 +180,7 @@ def _write_tendon(
 
 
 def _tendon(model: Any, data: Any) -> None:
-    """Compute the tendons, and again if each world has its own arms."""
+    """Compute the tendons as mujoco-warp does, and again if worlds have different arms."""
     _theirs(model, data)
     if model.wrap_prm.size == data.nworld * model.wrap_objid.size and data.nworld > 1:
         wp.launch(

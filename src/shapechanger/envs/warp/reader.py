@@ -31,7 +31,7 @@ class BodyReader:
     Args:
         task: The batched functions of the task.
         first: A CPU env of the task.
-        make: Makes a CPU env of it from arguments.
+        make: Makes a CPU env of the task from arguments.
         arguments: Arguments of the CPU env.
 
     Attributes:
@@ -59,12 +59,12 @@ class BodyReader:
         """Compile a body, and return it with the maker of a batch that begins with it.
 
         Raises:
-            ShapechangerError: If it cannot be built, or not for a device.
+            ShapechangerError: If the body cannot be built, or a device cannot simulate it.
         """
         env = self._env_with(body)
         model = env.model
         if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
-            # mujoco-warp has no PGS. Newton's method solves the same problem, to its end.
+            # mujoco-warp has no PGS. Newton's method solves the same problem until convergence.
             model = copy.copy(model)
             model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         layouts = env.observation_layout, env.action_layout
@@ -96,7 +96,7 @@ _READERS: Final[dict[type, _MakeReader]] = {
 
 
 def register_reader(env_class: type, reader: _MakeReader) -> None:
-    """Let a device read the bodies of a class of envs, without its subclasses, in another way."""
+    """Register the reader for a class of envs; subclasses of this class do not use it."""
     _READERS[env_class] = reader
 
 
@@ -125,7 +125,7 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
         if entry.device or entry.entry_point.rpartition(":")[2] in classes
     ]
     raise VectorEnvError(
-        f"{env_id} has no batched functions, which backend='warp' needs: those exist for "
+        f"{env_id} has no batched functions, which backend='warp' needs; these envs have them: "
         f"{', '.join(known)}."
     )
 
@@ -134,7 +134,7 @@ def grouped(reader: BodyReader, bodies: Sequence[Any], num_envs: int) -> list[Ma
     """Compile bodies, assign them to worlds in turn, and group worlds by the shapes of arrays.
 
     Returns:
-        The makers of each group's `Worlds`, from the device and what follows it.
+        One function per group, which makes its `Worlds` from the arguments from `device` on.
 
     Raises:
         VectorEnvError: If there are fewer worlds than shapes.
@@ -148,7 +148,7 @@ def grouped(reader: BodyReader, bodies: Sequence[Any], num_envs: int) -> list[Ma
                 break
         else:
             kinds.append((make, {body: read}))
-    # A pool of more bodies than worlds is spread over them.
+    # If there are more bodies than worlds, the worlds begin with bodies spread over the pool.
     step = max(1, len(bodies) // num_envs)
     each = [bodies[world * step % len(bodies)] for world in range(num_envs)]
     groups: list[MakeWorlds] = []

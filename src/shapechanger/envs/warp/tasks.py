@@ -1,7 +1,7 @@
 """Tasks as functions of the state of many worlds, with the constants of their CPU envs.
 
-Rewards are computed by the CPU envs' own formulas on tensors where these do not read a simulation;
-every weight and range is read from a CPU env.
+If the reward formula of a CPU env does not read a simulation, it is called with tensors. Every
+weight and range is read from a CPU env.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from shapechanger.errors import VectorEnvError
 from shapechanger.morphology.pose import StartRules
 
 _SHAPES: Final = ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
-# Slice of the quaternion in the numbers of a joint.
+# Offset of the quaternion in the numbers of a joint in `qpos`.
 _QUATERNION_AT: Final = {int(mujoco.mjtJoint.mjJNT_FREE): 3, int(mujoco.mjtJoint.mjJNT_BALL): 0}
 # Streams of random numbers.
 _POSITIONS: Final = 0
@@ -53,8 +53,8 @@ class DeviceTask(Worlds):
     """A task whose starts follow `StartRules`: noise around each body's pose, made feasible.
 
     Attributes:
-        normal_velocities: Whether start velocities are drawn normally, else uniformly.
-        place_size: How many numbers of a place the rewards and infos have, 0 to 2.
+        normal_velocities: Whether start velocities are drawn normally; if not, uniformly.
+        place_size: How many coordinates of the trunk the rewards and infos read, 0 to 2.
 
     Raises:
         VectorEnvError: If the body starts above a geom that is not a plane, or a geom that can
@@ -74,7 +74,7 @@ class DeviceTask(Worlds):
             if kind in _QUATERNION_AT
         ]
         self._lift = rules.lift
-        # Each floor with geoms of one shape.
+        # The geoms that can touch each floor, grouped by shape.
         touching: dict[tuple[int, str], list[int]] = {}
         for floor, geom in rules.floor_pairs if rules.lift is not None else ():
             below, shape = geom_type(model, floor), geom_type(model, geom)
@@ -115,7 +115,7 @@ class DeviceTask(Worlds):
             qpos[:, part] = torch.nn.functional.normalize(qpos[:, part], dim=1)
         self.qpos.copy_(torch.where(mask[:, None], qpos, self.qpos))
         self.qvel.copy_(torch.where(mask[:, None], qvel, self.qvel))
-        if self._lift is not None:  # A trunk whose feet are in the floor.
+        if self._lift is not None:  # Lift a trunk whose feet are in the floor.
             self.kinematics()
             lack = (-self._clearance()).clamp_min(0.0).masked_fill(~mask, 0.0)
             self.qpos[:, self._lift.place] += self._lift.up * lack
@@ -251,7 +251,7 @@ class DeviceDoublePendulum(DeviceTask):
         height = part * (constants["plain_length_m"] / constants["length_m"])
         height = height + constants["plain_foot_m"]
         fallen = ~(height > FALLEN_M)  # Also true if the height is not a number.
-        # Gymnasium's formula, without the bonus, which it adds by a condition.
+        # Call Gymnasium's formula without the bonus, which depends on a condition.
         there = SimpleNamespace(
             data=SimpleNamespace(qvel=self.qvel.T), _healthy_reward=env._healthy_reward
         )
@@ -261,10 +261,10 @@ class DeviceDoublePendulum(DeviceTask):
 
 
 class DeviceRunner(DeviceTask):
-    """Runners that never end."""
+    """Runners whose episodes never terminate."""
 
     place_size = 1
-    # Where the height of the trunk is in `qpos`.
+    # Index of the trunk's height in `qpos`.
     height_at: ClassVar[int] = 1
 
     @override
@@ -317,7 +317,7 @@ class DeviceCheetah(DeviceRunner):
 
 
 class DeviceWalker(DeviceRunner):
-    """Walkers, which are healthy within heights and leans."""
+    """Walkers, which are healthy within ranges of height and lean."""
 
     def _healthy(self) -> Tensor:
         lean = self.qpos[:, 2]
@@ -331,7 +331,7 @@ class DeviceWalker(DeviceRunner):
 
 
 class DeviceHopper(DeviceWalker):
-    """Hoppers, which are healthy within heights, leans and states."""
+    """Hoppers, which are healthy within ranges of height, lean and state."""
 
     def _healthy(self) -> Tensor:
         low, high = self._env._healthy_state_range
@@ -340,12 +340,12 @@ class DeviceHopper(DeviceWalker):
         return super()._healthy() & within
 
 
-# Blocks of numbers that a humanoid observes, each without the world's or the trunk's first rows.
+# Blocks of numbers that a humanoid observes, and how many first rows (world or trunk) are omitted.
 _BLOCKS: Final = {"cinert": 1, "cvel": 1, "qfrc_actuator": 6, "cfrc_ext": 1}
 
 
 class DeviceHumanoid(DeviceRunner):
-    """Humanoids, which are rewarded for the speed of their mass and healthy within heights."""
+    """Humanoids, rewarded for the speed of the centre of mass and healthy within heights."""
 
     place_size = height_at = 2
     contact_forces = True

@@ -29,7 +29,7 @@ Infos = dict[str, Tensor]
 """Tensors with a row per world, keyed by name."""
 
 _MOST_LISTED: Final = 4
-# Stream of the random numbers that choose bodies; tasks use those from 0 on.
+# Stream of the random numbers that choose bodies; tasks use the streams from 0 on.
 _BODIES: Final = -1
 # Arrays of the data that are attributes of `Worlds`.
 _ARRAYS: Final = (
@@ -41,7 +41,7 @@ _ARRAYS: Final = (
 _CLEARED: Final = ("act", "qacc_warmstart", "ctrl", "qvel", "cfrc_ext", "time")
 # Overflows of the memory for contacts and constraints, by which results are wrong.
 _OVERFLOWS: Final = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
-# The most contacts that MuJoCo makes of two geoms of which one has such a shape, and of others.
+# Largest number of contacts of two geoms of which one has the shape; "" for all other shapes.
 _MOST_CONTACTS: Final = {"SPHERE": 1, "CAPSULE": 2, "": 8}
 # Most rows of one equality.
 _ROWS_PER_EQUALITY: Final = 6
@@ -70,7 +70,7 @@ class Worlds(ABC):
         device: Name of the device.
         redraws: Whether each start of an episode draws one of the bodies.
         limits: How many contacts (`nconmax`) and rows of constraints (`njmax`) a world has memory
-            for; the largest possible number where one is missing.
+            for; a missing number is the largest possible one.
 
     Attributes:
         count: How many worlds there are.
@@ -129,7 +129,7 @@ class Worlds(ABC):
         # Fields of the model with a row per world.
         self._rows: dict[str, Tensor] = {}
         self.constants: dict[str, Tensor] = {}
-        # What depends on a world's body: a tensor, the part of it, and the rows of all bodies.
+        # Data that depend on a world's body: tensor, index into it, and the rows of all bodies.
         self._tables: dict[str, tuple[Tensor, Any, Tensor]] = {}
         self.change_bodies(bodies, each)
         self._before = self.place().clone()
@@ -140,7 +140,7 @@ class Worlds(ABC):
 
     @abstractmethod
     def begin(self, mask: Tensor, seeds: Tensor, episodes: Tensor) -> None:
-        """Put worlds, whose state has been cleared, into start states; arguments as of `start`."""
+        """Put worlds with a cleared state into start states; arguments as for `start`."""
 
     def apply(self, actions: Tensor) -> None:
         """Apply actions, shape (n, nu), and step the physics."""
@@ -243,7 +243,7 @@ class Worlds(ABC):
         view = self._rows[name] = as_torch(wide).view(self.count, *former.shape[1:])
         view[:] = former
         setattr(owner, field, wide)
-        self._graphs.clear()  # They hold the former array.
+        self._graphs.clear()  # The graphs refer to the former array.
         self._warm.clear()  # Some kernels depend on which arrays are wide.
 
     def step(self, actions: Tensor) -> tuple[Tensor, dict[str, Tensor], Infos]:
@@ -265,7 +265,7 @@ class Worlds(ABC):
         observations = self.observations()
         self._before = self.place().clone()
         state = torch.cat([self.qpos, self.qvel, self.qacc], dim=1)
-        # Also true for NaN.
+        # A NaN counts as diverged too.
         bounded = (state.abs() <= mujoco.mjMAXVAL).all(dim=1)
         diverged = ~(bounded & observations.isfinite().all(dim=1))
         observations = observations.masked_fill(~observations.isfinite(), 0.0)
