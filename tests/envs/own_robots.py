@@ -72,7 +72,7 @@ class Hoist:
 
 
 class Move:
-    """Move all joints, whatever the robot."""
+    """Move all joints of any robot."""
 
     def reward(self, robot: RobotState) -> dict[str, float]:
         """Return the mean speed of the joints, at most 1, and the cost of the actions."""

@@ -81,7 +81,7 @@ def test_steps_equal_gymnasiums(case: str) -> None:
             ours.reset(seed=seed)
             pose, velocity = ours.data.qpos.copy(), ours.data.qvel.copy()
             for env in (ours, theirs):
-                # Of an episode the physics remembers more than its state: begin without.
+                # Clear data of the last episode that `set_state` does not set.
                 mujoco.mj_resetData(env.model, env.data)
                 env.set_state(pose, velocity)
             theirs.init_qpos = ours.init_qpos

@@ -62,7 +62,7 @@ def _model(env_id: str, **arguments: Any) -> mujoco.MjModel:
 
 
 def _everything(env: Any) -> dict[str, Any]:
-    """Return all that follows from a body, and the state."""
+    """Return all attributes of an env that depend on its body, and the state."""
     return {
         "body": env.body,
         "model": _compiled(env.model),
@@ -305,7 +305,7 @@ _WEAKER = (Lock("hinge"), Split("pole", "hinge", lower=-1.0, upper=1.0, gear=9.0
 def test_other_motors_are_refused(
     name: str, arguments: dict[str, Any], body: Any, sentence: str, tmp_path: Path
 ) -> None:
-    """Motors that come or go, another order or other bounds, at which controls would be clipped."""
+    """Added or removed motors, another order of motors and other bounds of controls are refused."""
     if name == "InvertedPendulum":
         arguments = {"xml_file": _pendulum_with_a_motor_on_its_hinge(tmp_path)}
     with gym.make(f"shapechanger/{name}-v1", **arguments) as env:
@@ -351,8 +351,8 @@ def test_an_argument_of_another_type_is_refused(
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, True, "3", [3]])
-def test_what_is_no_seed_is_refused(seed: Any) -> None:
-    """A seed is refused before anything changes; NumPy's integers equal Python's."""
+def test_invalid_seeds_are_refused(seed: Any) -> None:
+    """An invalid seed is refused before the env changes; NumPy integers are valid."""
     with contextlib.closing(gym.make("shapechanger/Ant-v1", disable_env_checker=True)) as env:
         with pytest.raises(EnvArgumentError, match="A seed must be a whole number from 0, got "):
             env.reset(seed=seed)

@@ -34,7 +34,7 @@ def test_a_docstring_is_a_page_of_the_env(name: str) -> None:
     for layout, title in ((action, "Action"), (observation, "Observation")):
         assert layout is not None
         if (len(layout) == 1 and layout.size > 1) or name == "FingerTrack":
-            continue  # An image; or the table of `Finger-v1`, which has the first of its rows.
+            continue  # An image; or FingerTrack, which shares the table of `Finger-v1`.
         lines = re.findall(rf"^\| Num +\| {title} .*\n(?:\|.*\n)*", f"{page}\n", re.MULTILINE)
         rows = [tuple(re.split(r" *\| *", line)[1:-1]) for line in lines[0].splitlines()[2:]]
         assert rows == layout_rows(layout, title)

@@ -38,7 +38,7 @@ _CASES: dict[str, tuple[str, dict[str, Any]]] = {
     **{
         env_id.removeprefix("shapechanger/"): (env_id, {})
         for env_id, entry in CATALOGUE.items()
-        # These have more blocks; see test_layout_truth_of_blocks.py.
+        # These two observe more blocks; see test_layout_truth_of_blocks.py.
         if entry.family not in ("Humanoid", "InvertedDoublePendulum")
     },
     **{f"{name} with its place": (f"shapechanger/{name}-v1", _PLACE) for name in _PLANAR},

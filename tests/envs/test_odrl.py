@@ -185,7 +185,7 @@ _FACTORS = (0.1, 0.5, 2.0, 5.0)
 
 
 def test_every_target_has_an_id_and_is_compared_with_the_published_numbers() -> None:
-    """Four sources and eighty targets: the tables of this file leave out none."""
+    """The tables of this file contain all four sources and eighty targets."""
     kinematic = {f"{task}-{level}" for task in _RANGES for level in _LEVELS}
     kinds = itertools.product(_ROBOTS, ("friction", "gravity"), _FACTORS)
     scaled = {f"odrl-{robot}-{kind}-{factor}" for robot, kind, factor in kinds}
@@ -241,7 +241,7 @@ def test_gravity_is_scaled(robot: str, factor: float) -> None:
 @pytest.mark.parametrize("factor", [1.0, *_FACTORS])
 @pytest.mark.parametrize("robot", _ROBOTS)
 def test_friction_is_scaled(robot: str, factor: float) -> None:
-    """All coefficients of all geoms; of the hopper the sliding one, and not the floor's."""
+    """All coefficients are scaled; of the hopper, only sliding ones, and not the floor's."""
     model = _model(f"odrl-{robot}" + (f"-friction-{factor}" if factor != 1.0 else ""))
     published: Mapping[str, Point] = _FRICTION.get(robot, {})
     for geom, triple in published.items():
@@ -257,9 +257,9 @@ def test_friction_is_scaled(robot: str, factor: float) -> None:
 
 
 def test_two_published_tasks_are_one() -> None:
-    """Issue 8 of ODRL: below the floor's friction of 1, the foot's has no effect.
+    """A foot's friction below the floor's of 1 has no effect (issue 8 of ODRL).
 
-    No other two of the 84 are the same.
+    No other two of the 84 bodies are the same.
     """
     same: dict[str, list[str]] = {}
     for entry in ODRL_ENVS.values():

@@ -78,14 +78,14 @@ def test_a_robot_walks(dog: Path) -> None:
 
 
 def test_a_robot_starts_at_home(dog: Path) -> None:
-    """The keyframe is the start, and other bodies start at it as high as their feet need."""
+    """The robot starts in the keyframe; an edited body is raised as high as its feet need."""
     env = shapechanger.from_mjcf(dog, reset_noise_scale=0.0)
     env.reset(seed=0)
     np.testing.assert_allclose(_inner(env).data.qpos[7:], [0.2, -0.2])
     height = _inner(env).data.qpos[2]
     env.reset(options={"body": Stretch("front", 2.0)})
     assert _inner(env).data.qpos[2] > height + 0.2
-    # Standing on its longer leg.
+    # The dog stands on its longer leg.
     assert _inner(env).standing_height == pytest.approx(_inner(env).data.qpos[2])
 
 
@@ -104,7 +104,7 @@ def test_a_home_is_kept_joint_by_joint(dog: Path, body: Edit, angles: list[float
     np.testing.assert_allclose(_inner(env).data.qpos[7:], angles)
 
 
-def test_a_start_height_is_that_of_the_home_too(dog: Path) -> None:
+def test_a_start_height_applies_to_the_home_keyframe(dog: Path) -> None:
     """A robot that starts in a keyframe starts at the height that an edit gives."""
     env = shapechanger.from_mjcf(dog, body=StartHeight("trunk", 1.25), reset_noise_scale=0.0)
     env.reset(seed=0)
@@ -137,8 +137,8 @@ def test_a_custom_task(dog: Path) -> None:
     assert env.step(np.zeros(2))[2]
 
 
-def test_a_robot_without_shapes_is_a_robot(tmp_path: Path) -> None:
-    """A URDF whose links touch nothing; its links are points, from which it is seen."""
+def test_a_robot_without_shapes_is_accepted(tmp_path: Path) -> None:
+    """The reach of a URDF without shapes is computed from the origins of its links."""
     path = tmp_path / "arm.urdf"
     start, end = URDF.index("<collision>"), URDF.index("</collision>") + len("</collision>")
     path.write_text(URDF[:start] + URDF[end:])
@@ -158,7 +158,7 @@ def test_every_number_can_be_read(dog: Path) -> None:
 
 
 def test_an_up_axis_is_that_of_the_start(tmp_path: Path) -> None:
-    """A robot whose frame lies on its side is upright as it starts."""
+    """A robot is upright at its start, even if the frame of its trunk lies on its side."""
     path = tmp_path / "dog.xml"
     path.write_text(DOG.replace('qpos="0 0 .47 1 0 0 0', 'qpos="0 0 .47 .7071 .7071 0 0'))
     inner = _inner(shapechanger.from_mjcf(path, Rear))
@@ -175,7 +175,7 @@ def test_a_diverging_simulation_is_reported(dog: Path) -> None:
 
 
 def test_a_robot_is_made_again_from_its_spec(dog: Path) -> None:
-    """A class is named in it, so that JSON and worker processes can hold it."""
+    """The spec names the task's class, so that it can be JSON and sent to worker processes."""
     env = shapechanger.from_mjcf(dog, Rear, body=Stretch("back", 1.2), max_episode_steps=7)
     assert env.spec is not None
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
@@ -188,8 +188,8 @@ def test_a_robot_is_made_again_from_its_spec(dog: Path) -> None:
     assert again.spec.kwargs["task"] == REAR
 
 
-def test_a_study_makes_it_by_id(dog: Path) -> None:
-    """With arguments that JSON can hold, also a body and a rig as lists of objects."""
+def test_a_study_makes_the_env_by_id(dog: Path) -> None:
+    """All arguments can be JSON; body and rig are lists of objects."""
     edits = [{"edit": "stretch", "body": "front", "factor": 1.5}]
     ref = EnvRef("shapechanger/OwnRobot-v1", {"path": str(dog), "task": REAR, "body": edits})
     with ref.make() as env:
@@ -234,7 +234,7 @@ def test_many_at_once_equal_one_by_one(dog: Path) -> None:
 
 
 def test_a_urdf_stands_on_a_floor(tmp_path: Path) -> None:
-    """With motors, freedom and a floor as its rig."""
+    """The rig adds motors, a free joint and a floor."""
     path = tmp_path / "arm.urdf"
     path.write_text(URDF)
     rig = (AddMotor("*", 2.0), AddFreeJoint("base"), AddFloor())
@@ -260,7 +260,7 @@ def test_robots_in_a_plane_hide_their_place(tmp_path: Path) -> None:
 
 
 def test_fixed_robots_have_tasks_too(tmp_path: Path) -> None:
-    """An arm has nothing to hide, and its first body is its trunk."""
+    """An arm's observation has all positions, and its first body is its trunk."""
     path = tmp_path / "arm.urdf"
     path.write_text(URDF)
 
@@ -276,7 +276,7 @@ def test_fixed_robots_have_tasks_too(tmp_path: Path) -> None:
 
 
 def test_a_robot_that_would_fall_through_is_refused(dog: Path) -> None:
-    """No floor, or one that its geoms do not touch."""
+    """The task needs a floor that the robot's geoms can touch."""
     dog.write_text(DOG.replace('name="floor"', 'name="floor" contype="2" conaffinity="2"'))
     with pytest.raises(TaskError, match="would fall through the world"):
         shapechanger.from_mjcf(dog)
@@ -314,7 +314,7 @@ def test_velocity_servos_have_a_unit(dog: Path) -> None:
 def test_wrong_arguments_are_refused(
     dog: Path, arguments: dict[str, Any], error: type[Exception], sentence: str
 ) -> None:
-    """In one sentence that names what exists."""
+    """The message names the valid value or the nearest name."""
     with pytest.raises(error, match=sentence):
         EnvRef("shapechanger/OwnRobot-v1", {"path": str(dog), **arguments}).make()
 
@@ -330,7 +330,7 @@ def test_observed_numbers_must_exist(dog: Path) -> None:
 
 
 def test_models_that_do_not_compile_are_refused(dog: Path) -> None:
-    """With MuJoCo's reason in one sentence."""
+    """The message has MuJoCo's reason."""
     dog.write_text(
         DOG.replace('name="front" pos', 'name="paw" pos').replace(' mass="3"', ' mass="0"')
     )
@@ -339,7 +339,7 @@ def test_models_that_do_not_compile_are_refused(dog: Path) -> None:
 
 
 def test_models_without_joints_are_refused(dog: Path) -> None:
-    """Motors would not help."""
+    """The message does not suggest to add motors, which would not help."""
     dog.write_text('<mujoco><worldbody><body><geom size=".1"/></body></worldbody></mujoco>')
     with pytest.raises(MorphologyError, match=r"dog\.xml has no joints, so it cannot move"):
         shapechanger.from_mjcf(dog)

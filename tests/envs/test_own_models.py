@@ -1,4 +1,4 @@
-"""Files of robots of the user's own."""
+"""Model files of a user's robot: how they are found, read, rigged and refused."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_file_is_a_family(tmp_path: Path) -> None:
 
 
 def test_families_are_those_of_a_file_and_a_rig(tmp_path: Path) -> None:
-    """Between bodies of one file and rig others lie; between those of two files have none."""
+    """Bodies can be interpolated only if they have the same file and rig."""
     leg, arm = _written(tmp_path, "leg.xml", LEG), _written(tmp_path, "arm.urdf", URDF)
     assert own_family(leg).key == own_family(str(leg)).key
     keys = {own_family(leg).key, own_family(arm).key, own_family(arm, (AddFloor(),)).key}
@@ -62,7 +62,7 @@ def test_a_urdf_is_rigged(tmp_path: Path) -> None:
 
 
 def test_unnamed_elements_get_names(tmp_path: Path) -> None:
-    """Joints after their bodies, actuators after their joints."""
+    """Joints are named after their bodies, actuators after their joints."""
     text = (
         '<mujoco><worldbody><body><joint/><geom size=".1"/></body></worldbody><actuator><motor '
         'joint="j" ctrlrange="-1 1"/></actuator></mujoco>'
@@ -74,7 +74,7 @@ def test_unnamed_elements_get_names(tmp_path: Path) -> None:
 
 
 def test_meshes_lie_beside_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wherever the program runs."""
+    """Meshes are found next to the model file from any working directory."""
     (tmp_path / "parts").mkdir()
     _written(tmp_path / "parts", "wedge.obj", _OBJ)
     text = (
@@ -91,7 +91,7 @@ def test_meshes_lie_beside_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_files_that_do_not_exist_are_named(tmp_path: Path) -> None:
-    """With the models in the same folder."""
+    """The message lists the models in the same folder."""
     _written(tmp_path, "robot.xml", LEG)
     _written(tmp_path, "notes.txt", "")
     with pytest.raises(
@@ -110,7 +110,7 @@ def test_files_that_do_not_exist_are_named(tmp_path: Path) -> None:
     ],
 )
 def test_files_that_cannot_be_read_are_refused(tmp_path: Path, text: str, sentence: str) -> None:
-    """With MuJoCo's message in one sentence."""
+    """The message quotes MuJoCo's in one sentence."""
     path = _written(tmp_path, "broken.xml", text)
     with pytest.raises(BrokenModel, match=sentence) as refusal:
         own_family(path).load(path)
@@ -128,7 +128,7 @@ _LINK = """
 
 @pytest.mark.parametrize("scheme", ["package://", "package:///", "model://"])
 def test_packages_of_a_urdf_are_folders_around_it(tmp_path: Path, scheme: str) -> None:
-    """Next to it or above it, however many slashes precede them."""
+    """The folder may be next to the URDF or above it, after any number of slashes."""
     (tmp_path / "parts" / "urdf").mkdir(parents=True)
     _written(tmp_path / "parts", "wedge.obj", _OBJ)
     text = _LINK.format(mesh=f"{scheme}parts/wedge.obj", inertia=".1")
@@ -141,10 +141,10 @@ def test_packages_of_a_urdf_are_folders_around_it(tmp_path: Path, scheme: str) -
 
 
 def test_a_rig_on_a_robot_that_does_not_compile_is_refused(tmp_path: Path) -> None:
-    """With MuJoCo's reason, as without a rig; a mesh of COLLADA with the formats that it reads."""
+    """The message has MuJoCo's reason, or for a COLLADA mesh the formats that MuJoCo reads."""
     _written(tmp_path, "wedge.obj", _OBJ)
     file = _written(tmp_path, "link.urdf", _LINK.format(mesh="wedge.obj", inertia="9"))
-    # It compiles the robot to know its mass.
+    # `TotalMass` compiles the robot to compute its mass.
     family = own_family(file, (TotalMass(2.0),))
     with pytest.raises(BrokenModel, match=r"MuJoCo cannot compile link\.urdf: inertia must"):
         family.load(file)
@@ -156,7 +156,7 @@ def test_a_rig_on_a_robot_that_does_not_compile_is_refused(tmp_path: Path) -> No
 
 
 def test_robots_need_motors_with_a_range(tmp_path: Path) -> None:
-    """The error names the edit that adds them, or the actuators."""
+    """The error names the edit that adds motors, or the actuators without a range."""
     path = _written(tmp_path, "arm.urdf", URDF)
     model = compile_body(own_family(path).load(path))
     with pytest.raises(MorphologyError, match=r"arm\.urdf has no actuators.*AddMotor\('\*'\)\."):
@@ -191,7 +191,7 @@ def descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
 
 
 def test_robots_of_the_package_have_names(descriptions: Path) -> None:
-    """MJCF and URDF; the modules of the package know the files."""
+    """Modules of the package give the paths of MJCF and URDF files."""
     assert own_family("leg_mj_description").path == (descriptions / "leg.xml").resolve()
     family = own_family("arm_description", (AddMotor("*", 1.0),))
     np.testing.assert_array_equal(compile_body(family.load(family.path)).actuator_gear[:, 0], 1.0)
@@ -213,13 +213,13 @@ def test_robots_of_the_package_have_names(descriptions: Path) -> None:
 def test_robots_that_the_package_lacks_are_named(
     name: str, error: type[Exception], sentence: str
 ) -> None:
-    """With the nearest spelling, or the reason."""
+    """The message has the nearest name, or the reason of a failure."""
     with pytest.raises(error, match=sentence):
         own_family(name)
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the command that installs it."""
+    """The message has the command that installs the package."""
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
     with pytest.raises(MorphologyError, match="run `pip install robot_descriptions`"):
         own_family("go2_mj_description")

@@ -63,9 +63,9 @@ def _env(folder: Path, text: str, task: Any = "walk", **more: Any) -> tuple[Any,
 
 @pytest.mark.parametrize("first", [True, False])
 def test_objects_change_nothing_of_the_robot(tmp_path: Path, first: bool) -> None:
-    """Listed before or after it: the same trunk, height, starts and rewards; they start as written.
+    """Objects before or after the robot change neither its trunk, height, starts nor rewards.
 
-    The keyframe of the file is left out, because it names numbers of all joints.
+    Objects start as written. The file has no keyframe, because it would depend on all joints.
     """
     dog = DOG[: DOG.index("  <keyframe>")] + "</mujoco>"
     objects = _BALL + _DOOR
@@ -91,7 +91,7 @@ def test_objects_change_nothing_of_the_robot(tmp_path: Path, first: bool) -> Non
 
 @pytest.mark.parametrize("height", [-1.0, 2.0])
 def test_the_floor_may_be_anywhere(tmp_path: Path, height: float) -> None:
-    """Heights are above it, and so a robot on a high floor can fall too."""
+    """Heights are measured from the floor, so a robot on a high floor can fall too."""
     moved = DOG.replace(_FLOOR, _FLOOR.replace("/>", f' pos="0 0 {height}"/>'))
     moved = moved.replace(
         'key name="home" qpos="0 0 .47', f'key name="home" qpos="0 0 {height + 0.47}'
@@ -108,8 +108,8 @@ def test_the_floor_may_be_anywhere(tmp_path: Path, height: float) -> None:
         assert inner.task.healthy(robot) == stands
 
 
-def test_a_scene_is_its_own(tmp_path: Path) -> None:
-    """Sensors of the env read as MuJoCo's, because no plane is made transparent."""
+def test_range_finders_see_all_planes(tmp_path: Path) -> None:
+    """The env makes no plane transparent, so its sensors give the values of the plain model."""
     sensor = '<sensor><rangefinder site="eye"/></sensor></mujoco>'
     eye = '<site name="eye" pos=".3 0 .3" zaxis="0 0 -1"/>'
     for material in ("", 'rgba="1 1 1 0"', 'material="tiles"', 'material="tiles" rgba="0 1 0 0"'):
@@ -128,7 +128,7 @@ def test_a_scene_is_its_own(tmp_path: Path) -> None:
 
 
 def test_coupled_fingers_start_coupled_and_stay_without_motors(tmp_path: Path) -> None:
-    """An arm on a fixed base with a box to push: it cannot travel, and the box lies still."""
+    """The robot is an arm on a fixed base, and a box is an object that lies still."""
     box = '<body name="box" pos=".5 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>'
     scene = _FLOOR + box
     env, inner = _env(tmp_path, _ARM.format(scene=scene, actuators=_MOTORS), still)
@@ -144,14 +144,14 @@ def test_coupled_fingers_start_coupled_and_stay_without_motors(tmp_path: Path) -
         tmp_path, _ARM.format(scene=scene, actuators=""), still, rig=AddMotor("*", 2.0)
     )
     assert inner.action_layout.names == ("arm/motor", "left/motor")
-    # A joint that is named gets one.
+    # `AddMotor` adds a motor to a follower only if it is named.
     named = AddMotor("right", 2.0)
     _, inner = _env(tmp_path, _ARM.format(scene=scene, actuators=""), still, rig=named)
     assert inner.action_layout.names == ("right/motor",)
 
 
 def test_a_base_that_slides_in_a_plane_can_walk(tmp_path: Path) -> None:
-    """The task needs no floor, and a box earlier in the file is not taken for the trunk."""
+    """The task needs no floor, and a box earlier in the file is not used as the trunk."""
     box = '<body name="box" pos="1 0 .1"><freejoint/><geom size=".1"/></body>'
     text = f"""
     <mujoco><worldbody>{box}
@@ -173,7 +173,7 @@ def test_a_base_that_slides_in_a_plane_can_walk(tmp_path: Path) -> None:
 
 
 def test_a_copy_begins_an_episode_of_its_own(tmp_path: Path) -> None:
-    """One that was made in mid-episode refuses to step before its reset."""
+    """A copy that was made during an episode must be reset before it steps."""
     env, _ = _env(tmp_path, DOG)
     env.reset(seed=0)
     env.step(np.zeros(2))

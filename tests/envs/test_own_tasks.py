@@ -97,13 +97,13 @@ def test_a_task_is_found_by_name_class_function_or_object() -> None:
 def test_a_task_that_cannot_be_made_is_refused(
     task: Any, options: Any, error: type[Exception], sentence: str
 ) -> None:
-    """With its name, and the nearest spelling."""
+    """The message has the name of the task, and the nearest name if there is one."""
     with pytest.raises(error, match=sentence):
         as_task(task, options)
 
 
 def test_a_class_of_a_module_has_a_name_that_json_can_hold() -> None:
-    """Objects, local classes and functions without a name have none."""
+    """Objects, local classes and unnamed functions have no such name."""
 
     class Local(Still):
         pass
@@ -127,14 +127,14 @@ def test_a_class_of_a_module_has_a_name_that_json_can_hold() -> None:
     ],
 )
 def test_terms_are_finite_numbers(terms: Any, sentence: str) -> None:
-    """Anything else is refused, with the name of the term and of the task."""
+    """Other values are refused with the name of the term and of the task."""
     task, _ = as_task(lambda _: terms)
     with pytest.raises(TaskError, match=sentence):
         reward_terms(task, "mine", robot())
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    """Scalars, truth values and arrays without dimensions."""
+    """Terms may be NumPy scalars, booleans and arrays without dimensions."""
     task, _ = as_task(lambda _: {"a": np.float32(0.5), "b": np.True_, "c": np.array(2), "d": True})
     terms = reward_terms(task, "mine", robot())
     assert terms == {"a": 0.5, "b": 1.0, "c": 2.0, "d": 1.0}
@@ -154,7 +154,7 @@ def test_a_task_may_end_the_episode() -> None:
 
 
 def test_a_task_names_what_it_observes() -> None:
-    """A list of names or nothing."""
+    """`observe` must be a list of names, or missing."""
     task, _ = as_task(Still)
     assert observed(task) == ["torso/z"]
     assert observed(as_task("walk")[0]) is None
@@ -164,8 +164,8 @@ def test_a_task_names_what_it_observes() -> None:
             observed(task)
 
 
-def test_walking_pays_for_speed_and_health() -> None:
-    """A fallen robot earns its speed alone, and ends the episode unless told otherwise."""
+def test_walking_is_rewarded_for_speed_and_health() -> None:
+    """A fallen robot is rewarded only for speed, and ends the episode unless `terminate` is off."""
     walk = Walk(forward=2.0, alive=3.0, control=0.5, least_height=0.5, least_up=0.2)
     assert walk.reward(robot()) == {"forward": 4.0, "alive": 3.0, "control": -0.5}
     assert walk.measures[0] == FORWARD_SPEED
@@ -177,7 +177,7 @@ def test_walking_pays_for_speed_and_health() -> None:
 
 
 def test_walking_needs_a_floor_and_a_free_trunk() -> None:
-    """The errors name the edits that give them."""
+    """The errors name the edits that add them."""
     Walk().check(robot())
     with pytest.raises(TaskError, match=r"fixed to the world.*AddFreeJoint"):
         Walk().check(robot(can_travel=False))

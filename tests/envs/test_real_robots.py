@@ -1,7 +1,6 @@
-"""Robot files of other projects: each does all that an own robot can do, or is refused.
+"""Robot files of other projects work in `OwnRobotEnv`, or are refused with a reason.
 
-`make test-robots` installs the packages of `tests/robot_files.txt` for it, of which only models are
-read.
+`make test-robots` installs the packages of `tests/robot_files.txt`, of which only models are read.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ _MYO: Final = "myo_sim/models/legacy"
 _SUITE: Final = "robosuite/models/assets"
 _URDF: Final = "cmeel.prefix/share/example-robot-data/robots"
 _BIG: Final = 1.5
-# A pose counts as closed below this gap, m or rad, or at the file's.
+# A pose counts as closed below this gap, m or rad, or below the gap in the file's own pose.
 _CLOSED: Final = 1e-3
 
 _INERTIA: Final = r"'.+' has its inertia written out, so it would not follow a new shape"
@@ -67,10 +66,10 @@ class _Robot(NamedTuple):
 
     Attributes:
         path: Path in the folder of packages.
-        rig: Edits that it needs.
-        no_scale: The sentence that refuses to scale it; empty if it scales.
-        no_exam: The sentence with which it fails the exam, of one whose actuators are too strong;
-            empty if it passes.
+        rig: Edits that the robot needs.
+        no_scale: Message that refuses to scale the robot; empty if it can be scaled.
+        no_exam: Message with which a robot with too strong actuators fails the exam; empty if it
+            passes.
     """
 
     path: str
@@ -104,7 +103,7 @@ ROBOTS: Final = (
     _Robot("metaworld/assets/sawyer_xyz/sawyer_reach_v3.xml", no_scale=_MESH),
     _Robot(f"{_MYO}/elbow/myoelbow_2dof6muscles.xml", no_scale=_INERTIA),
     _Robot(f"{_MYO}/finger/myofinger_v0.xml", no_scale="The tendon 'dflx' would start .+ long"),
-    # The file tears the loops of its knees open by 5 cm.
+    # In the file's own pose, the loops of the knees are open by 5 cm.
     _Robot(f"{_MYO}/osl/myolegs_osl.xml", no_scale=_INERTIA),
     _Robot(f"{_SUITE}/grippers/jaco_three_finger_gripper.xml", no_scale=_INERTIA),
     _Robot(f"{_SUITE}/robots/baxter/robot.xml", no_scale=_INERTIA),
@@ -112,7 +111,7 @@ ROBOTS: Final = (
     _Robot(f"{_SUITE}/robots/gr1/robot.xml", no_scale=_INERTIA, no_exam=_AT_ONCE),
     _Robot(f"{_SUITE}/robots/panda/robot.xml", no_scale=_INERTIA),
     _Robot(f"{_SUITE}/robots/ur5e/robot.xml", no_scale=_INERTIA),
-    # Nothing of it touches anything, so MuJoCo keeps no shape.
+    # The robot has no collision shapes, so MuJoCo keeps no shape at all.
     _Robot(
         f"{_URDF}/alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf", _MOTORS, _INERTIA
     ),
@@ -122,7 +121,7 @@ ROBOTS: Final = (
         _INERTIA,
     ),
     _Robot(f"{_URDF}/panda_description/urdf/panda.urdf", _MOTORS, _INERTIA),
-    # Its file allows 10 N·m, at which it diverges. A Feetech STS3215 stalls at 30 kg·cm (12 V).
+    # With the file's limit of 10 N·m it diverges. A Feetech STS3215 stalls at 30 kg·cm (12 V).
     _Robot(f"{_URDF}/so_arm_description/urdf/so101.urdf", (AddMotor("*", 3.0),), _INERTIA),
     # 12 joints of its hands follow others.
     _Robot(f"{_URDF}/talos_data/robots/talos_full_v2.urdf", _MOTORS, _INERTIA),
@@ -152,15 +151,15 @@ each_robot = pytest.mark.parametrize("robot", ROBOTS, ids=_name)
 
 
 @pytest.mark.parametrize(("path", "sentence"), REFUSED.items())
-def test_a_file_that_is_no_robot_says_why(path: str, sentence: str) -> None:
-    """In one sentence, before anything is simulated."""
+def test_a_file_without_a_valid_robot_is_refused(path: str, sentence: str) -> None:
+    """The message gives the reason, before anything is simulated."""
     with pytest.raises(ShapechangerError, match=sentence):
         _Robot(path, _MOTORS if path.endswith(".urdf") else ()).make()
 
 
 @each_robot
 def test_a_robot_starts_with_closed_loops_and_steps(robot: _Robot) -> None:
-    """Inside its limits, with equalities as closed as in the file; random actions move it."""
+    """The start is inside the limits, with equalities as closed as in the file; actions move it."""
     env = robot.make()
     inner: Any = env.unwrapped
     model, data = inner.model, mujoco.MjData(inner.model)
@@ -202,7 +201,7 @@ def test_a_robot_is_scaled_or_refused(robot: _Robot) -> None:
 
 @each_robot
 def test_the_shift_of_a_robot_is_certified(robot: _Robot) -> None:
-    """A change of all masses counts, no edit does not."""
+    """A change of all masses is a shift; without an edit, the shift is refused as empty."""
     source, target = robot.make(), robot.make((Mass("*", scale=1.3),))
     certificate = source.unwrapped.certify_shift(source, target)
     assert "mass" in str(certificate)
@@ -212,7 +211,7 @@ def test_the_shift_of_a_robot_is_certified(robot: _Robot) -> None:
 
 @each_robot
 def test_a_robot_passes_the_exam(robot: _Robot) -> None:
-    """The exam of `shapechanger envs check`."""
+    """The robot passes `shapechanger envs check`, or fails with the expected message."""
     if robot.no_exam:
         with pytest.raises(BrokenPromise, match=robot.no_exam):
             list(examine(robot.make))
@@ -245,7 +244,7 @@ def test_a_robot_can_learn(robot: _Robot) -> None:
 
 
 class _Reached(BaseCallback):
-    """Least and largest number that each actuator was sent."""
+    """Records the least and the largest control of each actuator."""
 
     lowest: NDArray[np.float64]
     highest: NDArray[np.float64]

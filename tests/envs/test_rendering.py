@@ -19,7 +19,7 @@ from tests.drawing import run_python
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
 _SIZE = {"width": 120, "height": 90}
-# Bodies that differ in size, or in what surrounds them.
+# Bodies that differ in size or in their surroundings.
 _SHAPES = [
     f"shapechanger/{name}-v1"
     for name in ("Ant", "ExtendedAnt", "Humanoid", "InvertedDoublePendulum", "Swimmer", "Walker2d")
@@ -136,7 +136,7 @@ def _seen(env: Any) -> np.ndarray:
     ],
 )
 def test_the_camera_follows_the_body(name: str, moved: tuple[float, ...]) -> None:
-    """Far away a body has the same size, and an ant the same place, in the frame."""
+    """A body that has moved far away has the same size in the frame, and an ant the same place."""
     seen = []
     for place in ((0.0,) * len(moved), moved):
         with gym.make(f"shapechanger/{name}-v1", render_mode="rgb_array", **_SIZE) as env:
@@ -371,7 +371,7 @@ def test_floors_do_not_end(ant: Any) -> None:
     """An ant that has walked for a kilometre is still on tiles; the floor of contacts stays."""
     data = ant.unwrapped.data
     near = ant.render().astype(int)
-    repeats = 80.0 / 60.0  # Width of the floor, m, over the number of times that its tiles repeat.
+    repeats = 80.0 / 60.0  # Width of the floor, m, divided by the number of repeats of its tiles.
     data.qpos[0] += 750 * repeats
     mujoco.mj_forward(ant.unwrapped.model, data)
     floor = ant.unwrapped.model.geom("floor").id

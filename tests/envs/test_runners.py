@@ -85,7 +85,7 @@ def test_the_range_is_relative_to_the_joints_zero(height_m: float) -> None:
 
 @pytest.mark.parametrize(("name", "joint"), [("Hopper", "rooty"), ("HalfCheetah", "rooty")])
 def test_root_joints_cannot_be_locked(name: str, joint: str) -> None:
-    """Reward and termination need them."""
+    """Reward and termination need the root joints."""
     with pytest.raises(MorphologyError, match="must be slide, slide, hinge; here they are slide"):
         _made(name, body=Lock(joint))
 
@@ -123,7 +123,7 @@ def test_the_height_of_the_rail_does_not_matter() -> None:
 
 @pytest.mark.parametrize("body", [Lock("hinge2"), Remove("pole2")])
 def test_a_double_pendulum_needs_both_poles(body: Edit) -> None:
-    """Bodies without them are refused at `make` and at `reset`."""
+    """Bodies without two hinged poles and a tip are refused at `make` and at `reset`."""
     with pytest.raises(MorphologyError, match="two poles on hinges and a tip above them"):
         gym.make(_POLES, body=body)
     with gym.make(_POLES) as env:

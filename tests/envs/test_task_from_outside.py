@@ -1,4 +1,4 @@
-"""A task on a body of the catalogue, by a user: one file, and the preset of a learner."""
+"""A user defines a task with a body of the catalogue in one file, and trains it with a preset."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ eval_episodes = 1
 
 @pytest.fixture
 def task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """Return the id of the task, whose module is in a folder of the path."""
+    """Return the id of the task; its module can be imported."""
     (tmp_path / "high_hopper.py").write_text(_TASK)
     monkeypatch.syspath_prepend(tmp_path)
     yield "high_hopper:outside/HighHopper-v0"
@@ -64,8 +64,8 @@ def test_a_task_keeps_bodies_layouts_and_certificates(task: str) -> None:
         assert info["reward_height"] == reward > 0.5
 
 
-def test_a_preset_trains_it(task: str, tmp_path: Path) -> None:
-    """A TOML file of settings serves as for a task of the catalogue."""
+def test_a_preset_trains_the_task(task: str, tmp_path: Path) -> None:
+    """A TOML file of settings works as for a task of the catalogue."""
     file = tmp_path / "high.toml"
     file.write_text(_PRESET)
     learner = learner_of(*resolve_learner(str(file), {}))

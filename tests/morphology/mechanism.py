@@ -104,16 +104,16 @@ _TEXT = """
 
 
 class Mechanism(NamedTuple):
-    """Numbers that the mechanism follows from."""
+    """Parameters of the mechanism."""
 
-    crank: tuple[float, float]  # Its end in the plane of motion, x and z, m.
-    coupler: tuple[float, float]  # Its end from that of the crank, x and z, m.
-    rocker: tuple[float, float]  # Its end from its hinge, x and z, m.
+    crank: tuple[float, float]  # End of the crank in the plane of motion, x and z, m.
+    coupler: tuple[float, float]  # End of the coupler relative to the end of the crank, x and z, m.
+    rocker: tuple[float, float]  # End of the rocker relative to its hinge, x and z, m.
     pin: float  # Place of the pin on the coupler as a share of its length.
     tool: float  # Place of the tool on the coupler as a share of its length.
     turn: float  # Turn of the crank's frame, rad.
     slope: float  # Slope of the coupling of both fingers.
-    curve: float  # Its quadratic coefficient.
+    curve: float  # Quadratic coefficient of this coupling.
     form: str  # How the pin is written: "anchor", "reversed", "sites" or "weld".
     floats: bool  # Whether the base is free.
     in_degrees: bool  # Whether angles are written in degrees.

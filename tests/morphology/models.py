@@ -76,7 +76,7 @@ GANTRY = """
 </mujoco>
 """
 
-# An arm of two joints on a base, as URDF: the second joint states no effort.
+# An arm of two joints on a base, as URDF. The second joint has no effort limit.
 URDF = """
 <robot name="arm">
   <link name="base"><inertial><mass value="2"/>
@@ -259,7 +259,7 @@ def physics(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> di
         found[f"place {name}"] = np.array(data.geom_xpos[i])
         found[f"size {name}"] = np.array(model.geom_size[i])
     for i in range(model.nu):
-        # In hundreds, so that all values are of order one.
+        # Divide gears by 100, so that all values are of order one.
         found[f"gear {model.actuator(i).name}"] = 0.01 * model.actuator_gear[i]
     for i in range(model.njnt):
         joint = model.joint(i)

@@ -79,7 +79,7 @@ class Swing:
 
 
 class Wrapper:
-    """Minimal wrapper in the style of Gymnasium, which changes what is observed."""
+    """Minimal wrapper in the style of Gymnasium, which changes the observation."""
 
     def __init__(self, env: Any, sensed: Callable[[Any], Any] = lambda seen: seen) -> None:
         self.env, self._sensed = env, sensed

@@ -60,7 +60,7 @@ def _values(body: Body) -> dict[str, float]:
 
 @pytest.mark.parametrize("split", ["train", "interpolation", "extrapolation", "composition"])
 def test_splits_keep_to_their_ranges(split: Any) -> None:
-    """Only extrapolation leaves the ranges to learn in, and only composition combines parts."""
+    """Only extrapolation leaves the training ranges, and only composition combines parts."""
     outside, parts = [], []
     for body in ANT.sample(24, 0, split):
         values = _values(body)
@@ -77,7 +77,7 @@ def test_splits_keep_to_their_ranges(split: Any) -> None:
     [("Ant", "composition"), ("HalfCheetah", "composition"), ("Walker2d", "extrapolation")],
 )
 def test_drawn_bodies_compile_stand_and_differ(env: str, split: str) -> None:
-    """Each body can be made, stands, and is certified to differ from the family's own."""
+    """Each body compiles, stands, and is certified to differ from the unedited body."""
     with gym.make(f"shapechanger/{env}-v1") as own:
         inner: Any = own.unwrapped
         for body in inner.drawn_bodies(4, 1, split):

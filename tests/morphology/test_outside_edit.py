@@ -1,4 +1,4 @@
-"""An edit and a family of a package outside: one file, which names each of them once."""
+"""An edit and a family that another package defines in one file, without registration."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Soften(Edit, frozen=True):
 
     def check(self):
         if not 0.0 <= self.margin < 1.0:
-            raise MorphologyError(f"A margin is below a metre, got {self.margin}.")
+            raise MorphologyError(f"A margin must be below 1 m, got {self.margin}.")
 
     def apply(self, spec):
         for geom in select("geom", self.geom, spec.geoms):
@@ -64,7 +64,7 @@ LEGS = Family(
 
 @pytest.fixture
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Import the file, as a package outside that Shapechanger does not know."""
+    """Import the file, as a module of another package."""
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "outside_edit.py").write_text(_FILE, encoding="utf-8")
     monkeypatch.delitem(sys.modules, "outside_edit", raising=False)
@@ -72,8 +72,8 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     return importlib.import_module("outside_edit")
 
 
-def test_an_edit_of_a_file_outside_is_an_edit_like_any_other(module: Any) -> None:
-    """An edit of another module has JSON, an amount, paths, a certificate, and works in an env."""
+def test_an_edit_of_another_package_works_like_a_built_in_edit(module: Any) -> None:
+    """The edit has JSON and an amount, can be interpolated and certified, and works in an env."""
     edit = module.Soften("sole", 0.2)
     assert json.loads(to_json([edit])) == [{"edit": "soften", "geom": "sole", "margin": 0.2}]
     assert from_json(to_json([edit])) == (edit,)
@@ -87,12 +87,12 @@ def test_an_edit_of_a_file_outside_is_an_edit_like_any_other(module: Any) -> Non
         assert inner.model.geom("left_ankle_geom").margin[0] == 0.3
     with pytest.raises(UnknownName, match="No field of 'soften' matches 'margn'"):
         from_json('[{"edit":"soften","geom":"sole","margn":0.2}]')
-    with pytest.raises(MorphologyError, match="soften: A margin is below a metre, got 2"):
+    with pytest.raises(MorphologyError, match="soften: A margin must be below 1 m, got 2"):
         from_json('[{"edit":"soften","geom":"sole","margin":2}]')
 
 
-def test_a_family_of_a_file_outside_can_be_drawn_from(module: Any, tmp_path: Path) -> None:
-    """The axes of such a family may use an edit of another module."""
+def test_bodies_are_drawn_from_a_family_of_another_package(module: Any, tmp_path: Path) -> None:
+    """An axis of the family uses an edit of the same package."""
     path = tmp_path / "leg.xml"
     path.write_text(LEG, encoding="utf-8")
     family = module.LEGS
@@ -106,7 +106,7 @@ def test_a_family_of_a_file_outside_can_be_drawn_from(module: Any, tmp_path: Pat
 
 
 def test_a_name_belongs_to_one_edit(module: Any, tmp_path: Path) -> None:
-    """A file that is imported again keeps it; another class, or one like ours, is refused."""
+    """A module may be imported again; another class with the name of an edit is refused."""
     before = module.Soften
     again = importlib.reload(module)
     assert again.Soften is not before

@@ -69,7 +69,7 @@ _STEP = 1e-5
 
 def test_all_kinds_are_covered() -> None:
     """A new kind of edit must be added to these tests."""
-    rigging = (AddMotor, AddFreeJoint, AddFloor)  # The leg has motors, freedom and a floor.
+    rigging = (AddMotor, AddFreeJoint, AddFloor)  # The leg already has these.
     shipped = {kind for kind in EDITS.values() if kind.__module__.startswith("shapechanger.")}
     assert {*(type(edit) for edit in ONE_OF_EACH), *rigging} == shipped
     assert all(kind.__struct_config__.tag == name for name, kind in EDITS.items())
@@ -104,7 +104,7 @@ def test_edits_of_one_body_only_fade() -> None:
 
 
 def test_a_motor_of_one_body_fades() -> None:
-    """A segment with and without a motor is one segment, whose gear is interpolated."""
+    """Between a segment with a motor and one without, the motor's gear is interpolated."""
     passive, active = ANT.body("ExtendedAntPassive"), ANT.body("ExtendedAnt")
     for alpha in (0.01, 0.5, 0.99):
         for path in (interpolate(passive, active, alpha), interpolate(active, passive, 1 - alpha)):

@@ -79,7 +79,7 @@ def test_geoms_without_contact_are_no_floor(floor: str, ball: str) -> None:
 
 
 def test_a_body_starts_inside_its_limits() -> None:
-    """Joints move by the least amount to be a tenth of the range inside."""
+    """Joints move only as far as needed to be a tenth of their range inside their limits."""
     model = built(ant())
     pose = start_pose(model)
     for joint in range(1, model.njnt):
@@ -175,7 +175,7 @@ def test_feet_on_a_slide_start_on_the_floor(axis: str) -> None:
 
 
 def test_a_standing_pose_touches_the_floor() -> None:
-    """A trunk that hangs is lowered, one in the floor is raised, and joints keep their places."""
+    """A trunk above the floor is lowered, one in the floor is raised, and joints do not move."""
     model = built(ant())
     for height in (2.0, 0.1):
         pose = model.qpos0.copy()
@@ -236,7 +236,7 @@ def _gap(model: mujoco.MjModel, pose: np.ndarray) -> float:
 @pytest.mark.parametrize("jacobian", ["dense", "sparse"])
 @given(seed=st.integers(0, 1000), scale=st.sampled_from([0.05, 0.3]))
 def test_a_drawn_start_closes_loops(jacobian: str, seed: int, scale: float) -> None:
-    """Inside the limits; velocities open no loop, and the trunk stands above the floor."""
+    """The pose is inside the limits and above the floor, and the velocities open no loop."""
     model = mujoco.MjModel.from_xml_string(_FOUR_BAR.format(jacobian=jacobian))
     data, rules = mujoco.MjData(model), StartRules(model)
     start = start_pose(model)
@@ -260,7 +260,10 @@ def test_a_drawn_start_closes_loops(jacobian: str, seed: int, scale: float) -> N
 def test_coupled_joints_start_coupled(
     coefficients: tuple[float, float, float], low: float, drawn: tuple[float, float, float]
 ) -> None:
-    """By their polynomial, also in a chain, and inside the limits; or as well as the file does."""
+    """The pose follows the polynomials, also in a chain, inside the limits.
+
+    If that is impossible, the couplings are violated no more than in the file.
+    """
     text = " ".join(map(str, (*coefficients, 0.0, 0.0)))
     model = mujoco.MjModel.from_xml_string(_COUPLED.format(low=low, high=3.0, coefficients=text))
     rules, start = StartRules(model), start_pose(model)
@@ -272,7 +275,7 @@ def test_coupled_joints_start_coupled(
 
 
 def test_a_start_that_cannot_be_closed_is_the_files_own() -> None:
-    """Smaller deviations are tried before; here a joint that its damping locks keeps its noise."""
+    """Here no drawn deviation can be closed, because damping locks a joint."""
     text = _COUPLED.format(low=-3, high=3, coefficients="0 1 0 0 0").replace(
         'name="follow"', 'name="follow" damping="1e11"'
     )
@@ -284,7 +287,7 @@ def test_a_start_that_cannot_be_closed_is_the_files_own() -> None:
 
 
 def test_a_joint_at_its_limit_leaves_the_step_to_others() -> None:
-    """The leader cannot go up any more, so the follower comes down to it."""
+    """The leader is at its upper limit, so only the follower moves."""
     text = _COUPLED.format(low=-3, high=3, coefficients="0 1 0 0 0")
     model = mujoco.MjModel.from_xml_string(text)
     pose = StartRules(model).feasible(np.array([1.0, 2.5, -1.25]), mujoco.MjData(model))
@@ -304,7 +307,7 @@ def test_inactive_equalities_close_nothing() -> None:
 
 @pytest.mark.parametrize(("limits", "gap_m"), [("-65 -10", 0.0), ("10 90", 0.0227)])
 def test_a_file_that_starts_outside_its_limits_starts_inside(limits: str, gap_m: float) -> None:
-    """Closed, with the elbow bent to its other side; or as closed as its limits allow."""
+    """The loop is closed with the elbow bent to the other side, or as well as the limits allow."""
     model = mujoco.MjModel.from_xml_string(
         f"""
         <mujoco><worldbody>

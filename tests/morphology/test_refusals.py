@@ -1,4 +1,4 @@
-"""The page of refusals, compared with the exceptions of the code."""
+"""The page `docs/refusals.md` quotes every message with which an edit is refused."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def _raised() -> Iterator[str]:
 
 
 def _rules() -> list[list[str]]:
-    """Return the words of each row of the page, without the last: it is no `MorphologyError`."""
+    """Return the quoted words of each row of the page but the last, an `UnknownName`."""
     rows = [line.split("|") for line in _PAGE.read_text(encoding="utf-8").splitlines()]
     return [re.findall("`(.+?)`", row[3]) for row in rows if len(row) == 6][2:-1]
 
 
 def test_every_refusal_has_its_rule() -> None:
-    """Each sentence of the code has words of one rule of the page."""
+    """Exactly one row of the page quotes words of each message in the code."""
     rules = _rules()
     for sentence in {*_raised()}:
         found = [words for words in rules if any(each in sentence for each in words)]
@@ -40,7 +40,7 @@ def test_every_refusal_has_its_rule() -> None:
 
 
 def test_every_rule_has_its_refusal() -> None:
-    """The page has no words that no sentence of the code has, and is one screen long."""
+    """All words that the page quotes are in a message, and the page is shorter than 30 lines."""
     sentences = {*_raised()}
     for each in (words for rule in _rules() for words in rule):
         assert any(each in sentence for sentence in sentences), each

@@ -1,4 +1,4 @@
-"""Application of edits to a copy, to every model that Gymnasium ships, and compilation."""
+"""`reshape` edits a copy and works on all models of Gymnasium; `compile_body` compiles it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_edits_with_amount_0_are_skipped() -> None:
     ],
 )
 def test_a_body_that_does_not_compile_is_refused(edit: Edit, reason: str) -> None:
-    """The error has the body as JSON and MuJoCo's reason."""
+    """The error contains the body as JSON and MuJoCo's reason."""
     with pytest.raises(BrokenModel) as caught:
         built(leg(), edit)
     message = str(caught.value)

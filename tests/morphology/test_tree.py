@@ -60,7 +60,7 @@ def _number(tree: Tree, joint: str, name: str) -> float:
 
 
 def test_an_ants_tree() -> None:
-    """Eight joints with a motor each; parts without joints belong to what carries them."""
+    """Eight limbs have a motor each; bodies without joints belong to the body that carries them."""
     tree = _ant(())
     assert [limb.joint for limb in tree.limbs[:3]] == ["hip_1", "ankle_1", "hip_2"]
     assert {limb.actuator for limb in tree.limbs} == {limb.joint for limb in tree.limbs}
@@ -78,7 +78,7 @@ def test_an_ants_tree() -> None:
 
 
 def test_numbers_follow_the_edits() -> None:
-    """A longer shank ends farther away, a stronger motor and a heavier trunk show, no other."""
+    """A longer shank, a stronger motor and a heavier trunk change only their own numbers."""
     plain, changed = (
         _ant(()),
         _ant((Stretch("shank_1", 2.0), Gear("hip_2", 10.0), Mass("torso", 10.0))),
@@ -93,7 +93,7 @@ def test_numbers_follow_the_edits() -> None:
     assert stronger == pytest.approx(0.5, abs=0.01)
     assert _number(changed, "hip_4", "strength") == _number(plain, "hip_4", "strength")
     assert changed.numbers[0] > plain.numbers[0]
-    assert _ant((Cut("shank_1", 0.25),)).limbs[0] != plain.limbs[0]  # It carries less.
+    assert _ant((Cut("shank_1", 0.25),)).limbs[0] != plain.limbs[0]  # Limb 0 carries less mass.
 
 
 def test_vectors_are_in_the_frame_of_the_trunk() -> None:
@@ -107,7 +107,7 @@ def test_vectors_are_in_the_frame_of_the_trunk() -> None:
 
 
 def test_a_body_on_the_world() -> None:
-    """The trunk is the world; joints of one body share it, and the last one has its parts."""
+    """The trunk is the world; the last of several joints of one body has the body's parts."""
     model = mujoco.MjModel.from_xml_string(_ARM)
     tree = tree_of(model, model.qpos0)
     assert tree.trunk == ("world",)
@@ -119,7 +119,7 @@ def test_a_body_on_the_world() -> None:
     assert _number(tree, "along", "slides") == 1.0
     assert (_number(tree, "along", "lower"), _number(tree, "around", "upper")) == (-1.0, 0.0)
     assert _number(tree, "around", "strength") == 0.0
-    assert _number(tree, "along", "mass") == -3.0  # Of nothing.
+    assert _number(tree, "along", "mass") == -3.0  # No mass.
     assert _number(tree, "around", "mass with limbs") == pytest.approx(math.log10(3.0), abs=1e-3)
     # The capsule's end is farther from the joint than the spheres.
     reach = _number(tree, "around", "end x") * _number(tree, "around", "length")
@@ -161,9 +161,9 @@ _TENDONS = """
     ("actuators", "movers"),
     [
         ('<motor name="e" tendon="flex_elbow"/>', {"elbow": "e"}),
-        # Of equal moments, the joint nearer to the trunk.
+        # If moments are equal, the joint nearer to the trunk gets the actuator.
         ('<motor name="b" tendon="both"/>', {"shoulder": "b"}),
-        # A joint with a motor is left to it, wherever the motor stands in the file.
+        # A joint keeps its own motor, wherever the motor is in the file.
         (
             '<motor name="b" tendon="both"/><motor name="s" joint="shoulder"/>',
             {"shoulder": "s", "elbow": "b"},
@@ -179,7 +179,7 @@ _TENDONS = """
 def test_an_actuator_goes_to_the_joint_that_it_turns_most(
     actuators: str, movers: dict[str, str]
 ) -> None:
-    """Ids of tendons, sites and bodies are not taken for those of joints."""
+    """Indices of tendons, sites and bodies are not used as indices of joints."""
     model = mujoco.MjModel.from_xml_string(_TENDONS.format(actuators))
     tree = tree_of(model, np.zeros(model.nq))
     assert {limb.joint: limb.actuator for limb in tree.limbs if limb.actuator} == movers
@@ -200,7 +200,7 @@ def test_the_strength_of_a_tendon_is_a_torque(actuators: str, torque: float) -> 
     assert strength == pytest.approx(math.log10(1.0 + torque) / 2.0)
 
 
-# Objects come first, so that nothing is right by the order of the file.
+# Objects come first, so that code that relies on the order of the file fails.
 _SCENE = """
 <mujoco>
   <worldbody>
@@ -250,7 +250,7 @@ def _robot(model: mujoco.MjModel) -> list[str]:
     ],
 )
 def test_the_robot_is_what_actuators_move(more: str) -> None:
-    """Through any transmission, with the fixed bodies that carry it, and without objects."""
+    """Any transmission counts; the robot includes fixed bodies that carry it, but no objects."""
     assert _robot(_model(more)) == _ROBOT
 
 
@@ -270,7 +270,7 @@ def test_the_robot_is_what_actuators_move(more: str) -> None:
 def test_what_an_equality_couples_to_the_robot_is_part_of_it(
     coupling: str, also: list[str]
 ) -> None:
-    """As the second finger of a gripper; also by way of another."""
+    """The coupling may be direct, as for a second finger, or through a third body."""
     tendons = "".join(
         f'<fixed name="{name}"><joint joint="{joint}" coef="1"/></fixed>'
         for name, joint in (("one", "arm"), ("other", "door"))
@@ -288,12 +288,12 @@ def test_a_flex_couples_no_bodies() -> None:
 
 
 def test_without_actuators_everything_is_the_robot() -> None:
-    """As in a description that gets its motors later; the world is no part of it."""
+    """Motors may be added to such a model later. The world is not part of the robot."""
     assert _robot(_model("")) == ["ball", "door", "base", "arm"]
 
 
 def test_the_trunk_is_the_tree_that_most_actuators_move() -> None:
-    """A free ball is no trunk, and a robot with fewer motors comes second."""
+    """The trunk is neither a free ball nor a robot with fewer motors."""
     assert travelling_body(_model(_MOVED_BY_JOINT)) is None
     assert trunk_lift(_model(_MOVED_BY_JOINT)) is None
     model = _model(
@@ -329,7 +329,7 @@ _WALKER = """
 
 
 def test_objects_neither_carry_the_robot_nor_move() -> None:
-    """The standing height, the start, the mass and the limbs count the robot alone."""
+    """Standing height, start, mass and limbs depend only on the robot."""
     model = mujoco.MjModel.from_xml_string(_WALKER)
     rules = StartRules(model)
     start = start_pose(model)
@@ -363,7 +363,7 @@ def test_a_joint_that_its_damping_locks_is_at_rest() -> None:
 
 @pytest.mark.parametrize(("floor", "height"), [('pos="0 0 -.7"', -0.7), ('contype="0"', 0.0)])
 def test_the_floor_need_not_be_at_zero(floor: str, height: float) -> None:
-    """Without one that the robot can touch it counts as 0."""
+    """The floor's height is 0 if there is no floor that the robot can touch."""
     text = _WALKER.replace('size="9 9 1"/>', f'size="9 9 1" {floor} conaffinity="0"/>')
     text = text.replace('conaffinity="0"', "") if "pos" in floor else text
     model = mujoco.MjModel.from_xml_string(text)
@@ -371,7 +371,7 @@ def test_the_floor_need_not_be_at_zero(floor: str, height: float) -> None:
 
 
 def test_large_models_have_dense_jacobians_on_mujoco_4_0_0() -> None:
-    """Newton's solver factorises a wrong Hessian there from 60 degrees of freedom on."""
+    """In this version, Newton's solver factorises a wrong Hessian from 60 degrees of freedom on."""
     spec = mujoco.MjSpec()
     body = spec.worldbody
     for i in range(61):

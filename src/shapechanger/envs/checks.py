@@ -184,7 +184,7 @@ def describe_body(env: gym.Env[Any, Any]) -> str:
 
 
 def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
-    """Return one seed per env; a single number is the first env's seed, and the others count up.
+    """Return one seed per env; a single number is the first env's, and the next envs count up.
 
     Args:
         seed: A number, one seed per env, or None.

@@ -22,7 +22,7 @@ def measured(data: mujoco.MjData) -> float:
 
 @pytest.fixture
 def user_clock() -> Iterator[list[float]]:
-    """A clock of a user; the list holds its readings."""
+    """Install a clock of a user, and return the list of its readings."""
     readings: list[float] = []
     mujoco.set_mjcb_time(lambda: readings.append(0.0) or float(len(readings)))
     yield readings

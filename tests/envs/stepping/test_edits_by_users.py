@@ -58,7 +58,7 @@ def _slippery(model: Any) -> None:
     model.geom_friction[:] *= 0.1
 
 
-# That each single number is watched is tested below.
+# Tests below check that each single number is watched.
 _EDITS: list[Edit] = [_gravity, _timestep, _flags, _no_floor, _heavier, _stronger, _slippery]
 
 
@@ -77,7 +77,7 @@ def _play(envs: tuple[Any, Any], steps: int, seed: int) -> None:
 
 @pytest.mark.parametrize("edit", _EDITS, ids=lambda edit: edit.__name__)
 def test_an_edit_takes_effect(edit: Edit) -> None:
-    """Edits count between and within episodes, and no more once they are undone."""
+    """Edits take effect between and within episodes, until they are undone."""
     ours, _ = envs = _ants()
     kept = [(env.model, copy.copy(env.model)) for env in envs]
     for env in envs:
@@ -183,7 +183,7 @@ def test_an_unedited_model_is_unedited() -> None:
     assert watch.unedited()
     assert watch.digest == ModelWatch(AntEnv().model).digest
     assert watch.digest != ModelWatch(AntEnv("BigAnt").model).digest
-    assert len({ModelWatch(AntEnv().model).digest for _ in range(20)}) == 1  # Wherever it lies.
+    assert len({ModelWatch(AntEnv().model).digest for _ in range(20)}) == 1  # At any address.
 
 
 def _other(value: Any, kind: np.dtype[Any]) -> Any:

@@ -101,7 +101,7 @@ def test_bodies_must_share_their_spaces(bodies: list[Any], sentence: str) -> Non
     ],
 )
 def test_bad_arguments_are_refused(env_id: str, arguments: dict[str, Any], sentence: str) -> None:
-    """Unknown names, and what a backend does not have."""
+    """Unknown names and arguments that a backend does not have are refused."""
     with pytest.raises((VectorEnvError, UnknownName, EnvArgumentError), match=sentence):
         shapechanger.make_vec(env_id, 2, **arguments)
 
@@ -183,8 +183,8 @@ def test_wrong_numbers_of_seeds_and_values_are_refused(ants: ThreadVectorEnv) ->
     "seed",
     [-1, 2**63 - 2, 2**64, 1.5, True, "123", b"123", np.float32(3.0), [0, 1, -1], [0, 1, 2**63]],
 )
-def test_what_is_no_seed_is_refused(ants: ThreadVectorEnv, seed: Any) -> None:
-    """Seeds are whole numbers from 0, and no more than a device holds in 64 bits."""
+def test_invalid_seeds_are_refused(ants: ThreadVectorEnv, seed: Any) -> None:
+    """Seeds must be whole numbers from 0 to the largest signed 64-bit integer."""
     before = ants.reset(seed=3)[0].copy()
     with pytest.raises(
         VectorEnvError, match=r"A seed must be a whole number from 0 to 92\d+, got "

@@ -1,4 +1,4 @@
-"""Results equal Gymnasium's `SyncVectorEnv`'s, bitwise."""
+"""`ThreadVectorEnv` gives the results of Gymnasium's `SyncVectorEnv`, to the last bit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shapechanger.envs import CATALOGUE
 from shapechanger.envs.vector import ThreadVectorEnv
 from tests.envs.vector.sameness import MODES, play_side_by_side, random_bodies, require_same
 
-# Each pair of an env, a mode of autoreset and a number of threads; the slow test has all triples.
+# Env, autoreset mode and number of threads, with each pair of these; the slow test has all triples.
 _QUICK = [
     ("shapechanger/Ant-v1", "NextStep", 1),
     ("shapechanger/Ant-v1", "SameStep", 2),
@@ -27,7 +27,7 @@ _QUICK = [
 
 
 def _pair(env_id: str, bodies: list[Any], threads: int, mode: str, **more: Any) -> tuple[Any, Any]:
-    """Return our vector env and Gymnasium's over the same envs."""
+    """Return our vector env and Gymnasium's, with the same envs."""
     ours = shapechanger.make_vec(
         env_id, len(bodies), threads=threads, bodies=bodies, autoreset_mode=mode, **more
     )

@@ -42,8 +42,7 @@ def test_gymnasium_makes_the_same_envs(env_id: str) -> None:
         one.close()
 
 
-def test_a_backend_of_worlds_on_a_device() -> None:
-    """The spec makes an equal env."""
+def test_the_spec_of_worlds_on_a_device_makes_an_equal_env() -> None:
     bodies = ["InvertedPendulum", "BigInvertedPendulum"]
     envs = shapechanger.make_vec(
         "InvertedPendulum", 2, backend="warp", device="cpu", bodies=bodies, max_episode_steps=7
@@ -92,7 +91,7 @@ def test_each_env_may_have_a_body_of_its_own() -> None:
 
 
 def test_bodies_of_odrl_are_made_by_either_name() -> None:
-    """As on the command line, and by Gymnasium, whose ids have one slash."""
+    """The name is `odrl/NAME` as on the command line, `odrl-NAME`, or an id of Gymnasium."""
     name = "odrl-hopper-gravity-0.5"
     for envs in (
         shapechanger.make_vec(name.replace("odrl-", "odrl/"), 1),

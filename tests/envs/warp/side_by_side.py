@@ -34,12 +34,12 @@ BODIES: dict[str, list[Any]] = {
 WORLDS = 8
 # Where the exam runs, such as cuda:0.
 DEVICE = os.environ.get("SHAPECHANGER_TEST_DEVICE", "cpu")
-# Infos that a device has after each step besides the CPU env's.
+# Infos that a device has after each step in addition to the CPU env's.
 ALWAYS = {"final_obs", "final_info", "diverged"}
 
 # The device computes in single precision. Over the five or fewer physics steps of an action, the
-# largest differences seen in several hundred steps are 4e-5 of an observation's numbers and 6e-6 of
-# a reward, relative to 1 + the number.
+# largest differences in several hundred steps are 4e-5 for numbers of observations and 6e-6 for
+# rewards, relative to 1 + the number.
 OBSERVATION_TOLERANCE = 2e-4
 REWARD_TOLERANCE = 5e-5
 
@@ -65,7 +65,9 @@ def many(name: str, **arguments: Any) -> tuple[WarpVectorEnv, list[Any]]:
     ]
     for env in alone:
         if env.model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
-            env.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # As a device, which has no PGS.
+            env.model.opt.solver = (
+                mujoco.mjtSolver.mjSOL_NEWTON
+            )  # A device has no PGS and uses Newton's.
     return worlds, alone
 
 

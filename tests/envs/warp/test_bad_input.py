@@ -1,4 +1,4 @@
-"""What the backend `warp` refuses, in one sentence each."""
+"""The backend `warp` refuses missing packages, devices, tasks and invalid actions."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_missing_package_is_named_with_its_extra(
 
 
 def test_a_device_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error lists the devices that are."""
+    """The error lists the available devices."""
     with pytest.raises(UnknownName, match=r"No device matches 'cuda:9'.* There are: cpu"):
         shapechanger.make_vec("Ant", 2, backend="warp", device="cuda:9")
     with pytest.raises(UnknownName, match="Did you mean 'cpu'"):
@@ -45,7 +45,7 @@ def test_a_device_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_task_without_batched_functions() -> None:
-    """The error lists the tasks that have some."""
+    """The error lists the tasks with batched functions."""
     with pytest.raises(
         VectorEnvError, match=r"no batched functions.*Ant, AmputatedAnt.*Humanoid.* FingerTrack"
     ):
@@ -57,7 +57,7 @@ class _HigherReward(AntEnv):
 
 
 def test_a_changed_task_has_no_batched_functions() -> None:
-    """A subclass may have another reward, so the functions of its base are not its own."""
+    """A subclass may have another reward, so its base class's functions are not used."""
     gym.register("test/HigherReward-v0", _HigherReward)
     try:
         with pytest.raises(VectorEnvError, match="test/HigherReward-v0 has no batched functions"):

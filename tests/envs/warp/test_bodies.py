@@ -49,7 +49,7 @@ def model_rows(envs: WarpVectorEnv, name: str) -> Any:
     return rows.expand(envs.num_envs, *rows.shape[1:]).numpy()
 
 
-def test_a_body_drawn_at_a_reset_moves_as_one_made_with_it(ants: WarpVectorEnv) -> None:
+def test_worlds_step_with_the_bodies_of_the_last_reset(ants: WarpVectorEnv) -> None:
     """After a reset with bodies, each world steps as the CPU env of its body."""
     bodies: list[Any] = [LONG, "AmputatedAnt", [Gravity((0.0, 0.0, -4.0))]]
     ants.reset(seed=1, options={"bodies": bodies})
@@ -69,7 +69,7 @@ def test_a_body_drawn_at_a_reset_moves_as_one_made_with_it(ants: WarpVectorEnv) 
 
 
 def test_a_body_with_other_arrays_is_refused(ants: WarpVectorEnv) -> None:
-    """The sentence names the arrays and both bodies, and nothing has changed."""
+    """The message names the arrays and both bodies, and no world changes."""
     ants.reset(seed=0, options={"bodies": ["Ant", "BigAnt", "Ant"]})
     before = ants.bodies
     sentence = r"body ExtendedAnt cannot join the batch of .*, body Ant, because nq, .* differ"
@@ -102,7 +102,7 @@ def test_a_body_with_other_arrays_is_refused(ants: WarpVectorEnv) -> None:
     ],
     ids=lambda edit: type(edit).__name__,
 )
-def test_what_may_share_a_batch_is_what_mujoco_warp_shares(edit: Edit) -> None:
+def test_bodies_share_a_batch_if_mujoco_warp_can_share_their_arrays(edit: Edit) -> None:
     """Bodies without differing arrays have equal models, except for the rows of each world."""
     plain: Any = gym.make("shapechanger/Ant-v1").unwrapped
     edited: Any = gym.make("shapechanger/Ant-v1", body=edit).unwrapped
@@ -115,14 +115,14 @@ def test_what_may_share_a_batch_is_what_mujoco_warp_shares(edit: Edit) -> None:
     for field in dataclasses.fields(mjw.Model):
         left, right = getattr(one, field.name), getattr(other, field.name)
         if field.name in ("dof_length", "site_size"):
-            continue  # Read by sleeping bodies and by sensors alone.
+            continue  # Only sleeping bodies and sensors read these.
         if isinstance(left, int | bool):
             assert left == right, field.name
         elif isinstance(left, wp.array) and field.type.shape[0] != "*":
             assert np.array_equal(left.numpy(), right.numpy()), field.name
 
 
-def test_what_a_zero_leaves_out_is_not_shared() -> None:
+def test_bodies_with_and_without_a_kind_of_force_share_no_batch() -> None:
     """A fluid, or a friction in joints, needs a separate batch if others have none."""
     plain: Any = gym.make("shapechanger/Ant-v1").unwrapped
     bodies = []
@@ -142,7 +142,7 @@ def test_what_a_zero_leaves_out_is_not_shared() -> None:
 
 
 def test_bodies_of_other_shapes_form_batches() -> None:
-    """Where spaces differ, observations and actions come per batch, all else per world."""
+    """If spaces differ, there is one tensor of observations or actions per batch, not per world."""
     envs = shapechanger.make_vec(
         "Ant",
         3,
@@ -185,7 +185,7 @@ def test_bodies_of_other_shapes_and_equal_spaces_share_tensors() -> None:
 
 
 def test_a_pool_gives_each_episode_one_of_its_bodies() -> None:
-    """A world's body follows from its seed and episode, and is its simulation's."""
+    """Seed and episode of a world determine its body, and the world is simulated with it."""
     pool: list[Any] = ["Ant", LONG, "BigAnt"]
     made = [
         shapechanger.make_vec(
@@ -218,7 +218,7 @@ def test_a_pool_gives_each_episode_one_of_its_bodies() -> None:
 
 
 def test_a_pool_of_several_shapes_draws_within_each() -> None:
-    """A world keeps the spaces it was made with."""
+    """A world draws only bodies with the spaces that it was made with."""
     envs = shapechanger.make_vec(
         "Ant", 2, backend="warp", device="cpu", pool=["Ant", "ExtendedAnt", "BigAnt"]
     )
@@ -231,12 +231,12 @@ def test_a_pool_of_several_shapes_draws_within_each() -> None:
 
 
 @pytest.mark.parametrize("limit", ["njmax", "nconmax"])
-def test_too_little_memory_for_constraints_is_said(limit: str) -> None:
-    """By default there is room for the worst case; less is an argument, and its overflow warns."""
+def test_too_little_memory_for_constraints_gives_a_warning(limit: str) -> None:
+    """An overflow warns if an argument reduces the memory, which suffices by default."""
     arguments: Any = {limit: 1}
     envs = shapechanger.make_vec("Ant", 2, backend="warp", device="cpu", **arguments)
     envs.reset(seed=0)
-    envs._steps = 254  # The device is asked after 256 steps.
+    envs._steps = 254  # Overflows are checked every 256 steps.
     envs.batches[0].qpos[:, 2] = 0.1
     envs.step(torch.zeros(2, 8))
     with pytest.warns(UserWarning, match=f"2 worlds had more .*{limit}=1 .*memory for"):

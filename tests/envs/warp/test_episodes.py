@@ -54,7 +54,7 @@ def test_same_step_returns_the_start_and_keeps_the_end() -> None:
 
 
 def test_infos_of_a_restart_join_those_of_steps() -> None:
-    """Runners tell their place after a restart, and their speed after a step."""
+    """Infos of runners have the place after a restart, and the speed after a step."""
     envs = shapechanger.make_vec("Hopper", 2, backend="warp", device="cpu", max_episode_steps=1)
     envs.reset(seed=0)
     infos = envs.step(torch.zeros(2, 3))[-1]
@@ -65,7 +65,7 @@ def test_infos_of_a_restart_join_those_of_steps() -> None:
 
 @pytest.mark.parametrize("task_infos", [True, False])
 def test_ends_and_divergence_are_always_in_the_infos(task_infos: bool) -> None:
-    """A learner reads them without asking whether they are there; task infos can be left out."""
+    """`final_obs` and `diverged` are in every step's infos, with and without task infos."""
     infos = pendulums(task_infos=task_infos).step(torch.zeros(WORLDS, 1))[-1]
     always = ("final_obs", "_final_obs", "diverged", "_diverged")
     assert all(len(infos[name]) == WORLDS for name in always)
@@ -74,7 +74,7 @@ def test_ends_and_divergence_are_always_in_the_infos(task_infos: bool) -> None:
 
 
 def test_time_limits_are_those_of_the_id() -> None:
-    """An episode is truncated after as many steps as the spec says, counted from its start."""
+    """An episode is truncated after `max_episode_steps` of the spec, counted from its start."""
     assert pendulums().max_episode_steps == 1000
     envs = pendulums(max_episode_steps=3)
     ends = [envs.step(torch.zeros(WORLDS, 1))[3].all() for _ in range(8)]
@@ -90,7 +90,7 @@ def test_a_seed_gives_the_same_world_anywhere() -> None:
     assert torch.equal(other.reset(seed=5)[0][0], first[1])
     assert torch.equal(other.reset()[0][0], second[1])
     assert not torch.equal(first, second)
-    # A reset with a mask goes on with the others' seeds.
+    # A reset with a mask does not change the seeds of the other worlds.
     third, _ = envs.reset(seed=[None, 5, None], options={"reset_mask": np.array([0, 1, 0], bool)})
     assert torch.equal(third[1], first[1])
     with pytest.raises(ValueError, match="3 envs and 2 seeds"):
@@ -111,7 +111,7 @@ def test_worlds_without_seeds_differ() -> None:
 
 
 def test_the_noise_is_uniform_and_normal() -> None:
-    """Means and variances are the distributions', and streams are independent."""
+    """Means and variances fit the distributions, and streams are independent."""
     seeds, episodes = torch.arange(200), torch.zeros(200, dtype=torch.int64)
     flat = uniforms(seeds, episodes, 0, 500)
     assert flat.min() >= 0.0
@@ -156,7 +156,7 @@ def test_a_world_that_diverges_restarts_alone(velocity: float) -> None:
         assert found[0].isfinite().all()
 
 
-def test_inference_mode_and_gradients_leave_no_trace() -> None:
+def test_worlds_step_inside_and_outside_inference_mode_without_gradients() -> None:
     """Worlds rolled out in inference mode step and reset outside of it, and build no graph."""
     envs = pendulums()
     with torch.inference_mode():
@@ -171,7 +171,7 @@ def test_inference_mode_and_gradients_leave_no_trace() -> None:
 
 
 def test_a_closed_or_new_vector_env_does_not_step() -> None:
-    """The error names the way out."""
+    """The error names the call that is needed."""
     envs = shapechanger.make_vec("InvertedPendulum", 2, backend="warp", device="cpu")
     with pytest.raises(gym.error.ResetNeeded, match=re.escape("call `reset` first")):
         envs.step(torch.zeros(2, 1))

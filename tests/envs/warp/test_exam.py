@@ -40,7 +40,7 @@ def pair(request: pytest.FixtureRequest) -> Iterator[tuple[WarpVectorEnv, list[A
 def test_a_step_from_the_same_state_has_the_same_results(
     pair: tuple[WarpVectorEnv, list[Any]],
 ) -> None:
-    """Observation, reward, each term of it, and the end equal the CPU env's, for each body."""
+    """Observation, reward, reward terms and end equal the CPU env's, for each body."""
     worlds, alone = pair
     assert len(worlds.batches) == 1
     rng = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""Kernels compile for a GPU without one, and replace functions of mujoco-warp as long as needed."""
+"""Kernels compile for a GPU on any machine, and mujoco-warp still needs the replaced functions."""
 
 # Warp reads the annotations, so they must not become strings.
 # pyright: basic, reportInvalidTypeForm=false
@@ -28,7 +28,7 @@ _CAPSULE = f"""
 
 
 def test_our_kernels_compile_for_an_h100(tmp_path: Path) -> None:
-    """CUDA's compiler accepts them, which is stricter than the one for CPUs."""
+    """CUDA's compiler, which is stricter than the compiler for CPUs, accepts our kernels."""
     files = wp.compile_aot_module(kernels, arch=90, module_dir=tmp_path, use_ptx=False)
     assert any(file.suffix == ".cubin" for file in files)
 
@@ -55,7 +55,7 @@ def _both(axis: wp.vec3, frames: wp.array[wp.mat33]):
 
 
 def test_a_steep_capsule_still_needs_our_contacts() -> None:
-    """If theirs has MuJoCo's axes, `plane_capsule` can go; ours has them."""
+    """Our contacts have MuJoCo's axes; once mujoco-warp's have, `plane_capsule` can be deleted."""
     model = mujoco.MjModel.from_xml_string(_CAPSULE)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -68,7 +68,7 @@ def test_a_steep_capsule_still_needs_our_contacts() -> None:
 
 
 def test_moment_arms_are_still_kept_once() -> None:
-    """If each world has its own, the tendons of `kernels` can go."""
+    """Once mujoco-warp keeps arms for each world, the tendons of `kernels` can be deleted."""
     fields: Any = dataclasses.fields(mjw.Model)
     arms = next(field for field in fields if field.name == "wrap_prm")
     assert arms.type.shape[0] != "*"

@@ -37,8 +37,8 @@ def _actions(envs: Any, number: int) -> Any:
         ("InvertedDoublePendulum", 1, 0, {}),
         ("Humanoid", 1, 0, {}),
         ("Finger", 1, 0, {}),
-        # Paths are NumPy functions: two synchronisations read which worlds started and their
-        # starts, and a copy writes the points.
+        # Paths are NumPy functions: two synchronisations read which worlds have started and where,
+        # and a copy writes the points of their paths.
         ("FingerTrack", 2, 1, {}),
     ],
 )
@@ -49,7 +49,7 @@ def test_a_step_does_not_wait(
     arguments: dict[str, Any],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Ends, restarts and divergence add no synchronisation; no call mixes two devices."""
+    """Ends, restarts and divergence add no synchronisation, and no call mixes two devices."""
     with fake_device(monkeypatch) as device:
         envs = shapechanger.make_vec(name, 3, backend="warp", max_episode_steps=4, **arguments)
         envs.reset(seed=0)
@@ -72,7 +72,7 @@ def test_a_step_does_not_wait(
 
 
 def test_a_learner_adds_no_synchronisation(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rewards are scaled by the standard deviation of returns on the device."""
+    """The learner scales rewards by the standard deviation of returns on the device."""
     with fake_device(monkeypatch) as device:
         envs = RslVecEnv(
             shapechanger.make_vec("Ant", 3, backend="warp", max_episode_steps=3, task_infos=False),

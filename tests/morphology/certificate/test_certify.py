@@ -111,7 +111,7 @@ def test_gymnasium_environments_and_wrappers_are_certified(tmp_path: Path) -> No
 def test_an_edit_that_changes_only_the_rounding_is_empty(edit: Edit) -> None:
     """Resolving HalfCheetah's total mass changes masses by 4e-16 kg, which is no shift.
 
-    The friction of a foot at 0.2 is masked by that of the floor, 0.4.
+    The floor's friction of 0.4 masks a foot's friction of 0.2.
     """
     source = gymnasium.make("shapechanger/HalfCheetah-v1")
     target = gymnasium.make("shapechanger/HalfCheetah-v1", body=edit)
@@ -127,7 +127,7 @@ def test_an_edit_that_changes_only_the_rounding_is_empty(edit: Edit) -> None:
 @pytest.mark.parametrize("wrapped", [lambda env: env, dictionary, broken])
 @pytest.mark.parametrize("steps", [0, 20])
 def test_equal_environments_have_equal_rollouts(wrapped: Any, steps: int) -> None:
-    """Also one env twice, dictionaries in the order of their keys, and equal NaN."""
+    """One env compared with itself, dictionaries and equal NaN count as equal too."""
     env = wrapped(Swing())
     for target in (wrapped(Swing()), env):
         rollout = compare_rollouts(env, target, steps=steps)
@@ -177,7 +177,7 @@ def test_motors_of_the_same_name_get_the_same_commands() -> None:
         (Swing, lambda: noisy(Swing()), 20, "observations part at the reset in hinge/"),
         # NaN on one side is the largest finite difference.
         (Swing, lambda: broken(Swing()), 20, "in hinge/angle, by 1.798e+308."),
-        # A wrapper without a layout of its own: numbers are compared by their places.
+        # The wrapper has no layout, so numbers are compared by index.
         (
             Swing,
             lambda: longer(Swing()),
@@ -227,7 +227,7 @@ def test_commands_cover_their_range(
 
 
 def test_commands_are_in_both_ranges() -> None:
-    """In the intersection, or each in its own range if it is empty; else nearest to zero."""
+    """Commands are in the intersection of both ranges, or each in its own if that is empty."""
     wide, narrow, apart = (
         Layout((Feature("motor", "1", *bounds),))
         for bounds in ((-3.0, 3.0), (0.5, 1.0), (5.0, 6.0))
@@ -243,7 +243,7 @@ def test_commands_are_in_both_ranges() -> None:
 
 @pytest.mark.parametrize("after", [0, 1, 50, 100])
 def test_a_late_shift_is_no_rounding(after: int) -> None:
-    """What is sensed may differ late, by little, and between models that round differently."""
+    """A late, small difference of a sensor is found, even if the models round differently."""
     heavy = Swing(mass=1.0 + 1e-15)
     assert not certify(heavy, late(Swing(), after, 1e-6)).is_empty
     assert certify(Swing(), late(Swing(), after, 1e-12), allow_empty=True).is_empty
@@ -267,7 +267,7 @@ def test_compiled_models_are_consistent(name: str) -> None:
 
 
 def test_a_mass_written_into_a_compiled_model_is_found() -> None:
-    """By its stale constants, with the values measured on Ant-v5, and then by its inertia."""
+    """First stale constants, with values measured on Ant-v5, and then the inertia show the edit."""
     model = asset("ant")
     model.body("torso").mass[:] = 3.0
     message = " ".join(inconsistencies(model))
@@ -330,7 +330,7 @@ def test_bits_that_were_not_compiled_are_found() -> None:
     ],
 )
 def test_impossible_inertias_are_found(inertia: tuple[float, float, float], possible: bool) -> None:
-    """Moments must be positive, and the largest at most the sum of the others, as of a thin rod."""
+    """Moments must be positive, and the largest must not exceed the sum of the others."""
     model = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><body name='b'><joint/><inertial mass='1' pos='0 0 0' "
         "diaginertia='1 1 2'/></body></worldbody></mujoco>"

@@ -88,7 +88,7 @@ def _extend(spec: mujoco.MjSpec) -> None:
                 "nq: dimensions 15 -> 16 (x1.07)",
             ],
         ),
-        # Friction below that of the floor has no effect, as in two hopper tasks of ODRL.
+        # Friction below the floor's has no effect, as in two hopper tasks of ODRL.
         (lambda s: setattr(s.geom(_SHANK), "friction", [0.2, 0.5, 0.5]), []),
         (lambda _: None, []),
     ],
@@ -129,7 +129,7 @@ def test_lengths_of_visual_geoms_explain_their_bodies() -> None:
 def test_units_are_those_of_the_kind_of_joint(
     load: Callable[[], mujoco.MjModel], array: str, quantity: str, element: str, unit: str
 ) -> None:
-    """Slides have metres and N·s/m, hinges N·m·s/rad, tendons none."""
+    """Numbers of slides are in m and N·s/m, of hinges in N·m·s/rad; tendons have no unit."""
     target = load()
     getattr(target, array)[:] += 3.0
     found = {(c.quantity, c.element): c.unit for c in compare(load(), target)}
@@ -146,7 +146,7 @@ def test_another_order_of_motors_is_a_change() -> None:
 
 
 def test_derived_constants_are_listed_only_when_alone() -> None:
-    """If nothing else explains them, such as another height."""
+    """Derived constants are listed only if no other difference, such as a height, explains them."""
     target = asset("ant")
     target.dof_M0[0] *= 2.0
     (item,) = compare(asset("ant"), target)

@@ -154,7 +154,7 @@ def test_the_override_replaces_all_but_dimension_gap_and_adhesion() -> None:
 
 
 def test_an_explicit_pair_has_its_own_parameters() -> None:
-    """A pair ignores the collision bits and may be of parent and child."""
+    """A pair ignores the collision bits and may join a parent and its child."""
     child = "<body name='c'><joint/><geom name='c' size='.1' contype='0' conaffinity='0'/></body>"
     pair = (
         "<pair geom1='floor' geom2='ball' friction='.1 .9 .01 .02 .03' condim='6'"
@@ -167,7 +167,7 @@ def test_an_explicit_pair_has_its_own_parameters() -> None:
     assert predicted["ball + floor"]["friction solref"] == (0.1, 2.0)
     for name, (contact,) in simulated.items():
         _assert_equal(predicted[name], contact)
-    model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL  # These ignore `solreffriction`.
+    model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL  # Pyramidal cones ignore `solreffriction`.
     assert "friction solref" not in _contacts(model)["ball + floor"]
 
 

@@ -74,13 +74,13 @@ def _cloth() -> mujoco.MjModel:
 
 @functools.cache
 def _nominal(load: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, Numbers, str]:
-    """Return a model, its numbers and its fingerprint, which nobody changes."""
+    """Return a model, its numbers and its fingerprint; callers must not change them."""
     model = load()
     return model, moved_numbers(model), fingerprint(model)
 
 
 def _array(model: mujoco.MjModel, name: str) -> Any:
-    """Return an array of a model or of its options; None for one that is made."""
+    """Return an array of a model or of its options; None for a computed array."""
     if name.startswith("opt_"):
         found = getattr(model.opt, name.removeprefix("opt_"), None)
         return None if found is None else np.asarray(found)
@@ -102,7 +102,7 @@ def _write(model: mujoco.MjModel, field: Field, rows: Any = slice(None)) -> None
     _array(model, field.array)[:] = new
 
 
-# Numbers of the table that MuJoCo has in an array; the others are made of several.
+# Numbers of the table that are an array of MuJoCo; the others are computed from several arrays.
 _WRITTEN = [
     (section, quantity, field)
     for section, fields in MOVED.items()
@@ -139,12 +139,12 @@ def test_a_number_counts_where_the_table_says_so_and_nowhere_else(
             continue
         ignored, model = ~np.asarray(mask).astype(bool), load()
         _write(model, field, ignored)
-        if np.array_equal(made_arrays(model)[field.where], mask):  # Else it makes itself count.
+        if np.array_equal(made_arrays(model)[field.where], mask):  # The write kept the mask.
             assert moved_numbers(model)[section] == before[section]
     assert listed
 
 
-# Arrays of which several numbers of the table are made, and a row that is written.
+# Arrays from which several numbers of the table are computed, and the row to write to.
 _MADE = {
     **dict.fromkeys(("body_gravcomp", "body_invweight0", "body_subtreemass", "geom_rbound"), 4),
     **{"dof_M0": 3, "dof_invweight0": 3, "geom_contype": 3, "geom_conaffinity": 8},
@@ -164,7 +164,7 @@ _OFF = ("limited", "contype", "conaffinity", "signature")
 
 
 @pytest.mark.parametrize("array", _MADE)
-def test_whatever_a_number_is_made_of_counts(array: str) -> None:
+def test_each_array_behind_a_number_changes_the_fingerprint(array: str) -> None:
     model = everything()
     values, row = getattr(model, array), _MADE[array]
     if array.endswith("dim"):
@@ -393,7 +393,7 @@ _PLAIN = """<mujoco>
     ],
 )
 def test_each_change_counts_where_it_can_be_read(old: str, new: str, drawn: bool) -> None:
-    """Cameras, colours and lights count only where frames are observed."""
+    """Cameras, colours and lights count only if frames are observed."""
     assert old in _PLAIN
     one, two = (
         mujoco.MjModel.from_xml_string(text) for text in (_PLAIN, _PLAIN.replace(old, new, 1))

@@ -35,8 +35,8 @@ def test_a_cut_leaves_something() -> None:
         built(spec, Cut("lower", 0.5))
 
 
-def test_a_partial_cut_shrinks_what_goes() -> None:
-    """Geoms beyond it become small, and points at the end are pulled in by a part of the way."""
+def test_a_partial_cut_shrinks_elements_beyond_it() -> None:
+    """Geoms beyond the cut become small, and points at the end move a part of the way inwards."""
     spec = arm(lower='<geom name="far" size=".01" pos=".35 0 0"/><site name="end" pos=".4 0 0"/>')
     half = built(spec, Cut("lower", 0.5).partly(0.5))
     assert half.geom("far").size[0] == pytest.approx(0.005)
@@ -50,7 +50,7 @@ def test_a_glob_removes_parents_and_children_once() -> None:
 
 
 def test_a_split_gives_two_segments() -> None:
-    """Both parts cover the original, with a hinge like its own between them."""
+    """Both parts together cover the segment, and the new hinge is like the segment's own."""
     after = built(leg(), Split("thigh", "shank", at=1.0 / 3.0, gear=5.0))
     assert _bodies(after) == ["trunk", "thigh", "shank", "shin"]
     np.testing.assert_allclose(after.body("shank").pos, [0.0, 0.0, -0.1])
@@ -75,7 +75,7 @@ def test_a_split_divides_an_explicit_mass() -> None:
 @pytest.mark.parametrize("turned", ['euler="0 0 0"', 'euler="0 0 1.5707963267948966"'])
 @pytest.mark.parametrize("written", ["size", "ends"])
 def test_a_box_is_cut_along_the_segment(turned: str, written: str) -> None:
-    """Whichever of its half-sizes lies along it, and however it is written."""
+    """Any half-size of the box may lie along the segment, in any notation of the box."""
     sides = ".1 .02 .02" if "1.57" not in turned else ".02 .1 .02"
     box = f'type="box" size="{sides}" pos=".2 0 0" {turned}'
     if written == "ends":
@@ -100,7 +100,7 @@ def test_a_box_is_cut_along_the_segment(turned: str, written: str) -> None:
     assert ends.geom("lower_of_far").xpos[0] == pytest.approx(0.5 + 0.325)
 
 
-def test_a_geom_beside_the_axis_is_divided_where_it_is() -> None:
+def test_a_divided_geom_keeps_its_distance_from_the_axis() -> None:
     spec = arm(lower='<geom name="rib" type="capsule" fromto="0 .05 0 .3 .05 0" size=".01"/>')
     data = posed(built(spec, Split("lower", "far", 0.25)))
     np.testing.assert_allclose(data.geom("rib").xpos, [0.55, 0.05, 1.0], atol=1e-12)

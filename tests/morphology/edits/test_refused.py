@@ -1,4 +1,4 @@
-"""What edits refuse when they are made, and when they are applied."""
+"""Values and models that edits refuse, when they are made and when they are applied."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _bounds(kind: Any) -> list[float]:
 
 @pytest.mark.parametrize("edit", _EVERY, ids=lambda edit: type(edit).__name__)
 def test_numbers_out_of_range_are_refused_when_the_edit_is_made(edit: Edit) -> None:
-    """The sentence names the field, its range and the number; vectors are three finite numbers."""
+    """The message names the field, its range and the number; vectors need three finite numbers."""
     for field in msgspec.structs.fields(edit):
         text, bad = str(field.type), [math.nan, math.inf, -math.inf]
         wrong: list[Any] = [] if "float" not in text else [*bad, *_bounds(field.type)]
@@ -129,7 +129,7 @@ def test_values_that_do_not_fit_each_other_are_refused(
 
 @pytest.mark.parametrize("edit", _EVERY, ids=lambda edit: type(edit).__name__)
 def test_the_nearest_element_of_the_kind_is_suggested(edit: Edit) -> None:
-    """For every kind of edit that names one."""
+    """Every kind of edit that names an element suggests the nearest name."""
     names = [(n, v) for n, v in msgspec.structs.asdict(edit).items() if isinstance(v, str)]
     for field, value in names[:1]:
         wrong = msgspec.structs.replace(edit, **{field: f"{value}x"})

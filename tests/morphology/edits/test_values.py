@@ -60,7 +60,7 @@ _MOTORS = """
         '<inertial pos=".1 0 0" mass="2" diaginertia=".1 .2 .25"/><geom size=".1"/>',
     ],
 )
-def test_a_mass_can_be_set_for_geoms_and_for_an_inertial(content: str) -> None:
+def test_a_mass_can_be_set_from_geoms_or_an_inertial_element(content: str) -> None:
     before, after = built(limb(content)), built(limb(content), Mass("link", to=0.7))
     assert mass(after, "link") == pytest.approx(0.7)
     np.testing.assert_allclose(
@@ -180,7 +180,7 @@ def test_a_slide_without_limits_is_locked_at_a_position() -> None:
 
 
 def test_motors_are_as_strong_as_the_model_allows() -> None:
-    """The effort of a URDF is the gear; others need one."""
+    """The default gear is the effort limit of a URDF; a joint without one needs a gear."""
     model = built(spec_of(URDF), AddMotor("shoulder"), AddMotor("elbow", 3.0))
     assert [model.actuator(i).name for i in range(model.nu)] == ["shoulder", "elbow"]
     np.testing.assert_array_equal(model.actuator_gear[:, 0], [7.0, 3.0])
@@ -191,8 +191,8 @@ def test_motors_are_as_strong_as_the_model_allows() -> None:
     assert half.actuator_gear[0, 0] == 3.5
 
 
-def test_a_motor_of_something_else_is_no_motor_of_the_joint() -> None:
-    """A tendon and a joint may share a name."""
+def test_a_motor_of_a_tendon_is_not_a_motor_of_the_joint_of_the_same_name() -> None:
+    """`AddMotor` still adds a motor to the joint."""
     spec = spec_of(
         """
         <mujoco><worldbody>
@@ -204,7 +204,7 @@ def test_a_motor_of_something_else_is_no_motor_of_the_joint() -> None:
 
 
 def test_a_fixed_robot_is_set_free() -> None:
-    """It falls with its whole mass, although MuJoCo merges a URDF's base with the world."""
+    """The robot falls with its whole mass, although MuJoCo merges a URDF's base with the world."""
     fixed = built(spec_of(URDF))
     assert (fixed.nq, fixed.body_mass[0]) == (2, 0.0)
     free = compile_body(
@@ -248,7 +248,7 @@ def test_halfway_lies_between(ends: tuple[float, float]) -> None:
 
 
 def test_a_geom_is_moved_by_its_middle() -> None:
-    """Whatever its shape, and halfway at half the amount; its axes keep their directions."""
+    """A geom of any shape moves, by half the way at half the amount, and does not turn."""
     before = built(leg())
     for geom in ("sole", "shin", "trunk"):
         after = built(leg(), PlaceGeom(geom, middle=(0.0, 0.1, 0.2)))
@@ -263,7 +263,7 @@ def test_a_geom_is_moved_by_its_middle() -> None:
 
 
 def test_the_total_mass_is_set() -> None:
-    """After other edits, with the inertia in proportion; halfway at half the amount."""
+    """Earlier edits count, the inertia scales too, and half the amount goes half the way."""
     before = built(ant(), Mass("torso", scale=3.0))
     after = built(ant(), Mass("torso", scale=3.0), TotalMass(14.0))
     assert after.body_mass.sum() == pytest.approx(14.0, rel=1e-12)

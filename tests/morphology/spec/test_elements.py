@@ -1,4 +1,4 @@
-"""Selection, naming and copies of elements, and what is written out: frames and a total mass."""
+"""Selection, naming and copies of elements; frames and a total mass are written out."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_all_elements_get_unique_names() -> None:
     assert [actuator.name for actuator in spec.actuators] == ["knee", "knee_2", "m"]
 
 
-# Every element that frames can hold, in nested frames, in degrees.
+# Every kind of element that a frame can contain, in nested frames, in degrees.
 _FRAMES = """
 <mujoco>
   <worldbody>
@@ -149,7 +149,7 @@ def test_a_total_mass_does_not_undo_an_edit() -> None:
     assert mass(built(asset_spec("half_cheetah"), Mass("*", to=0.5))) == pytest.approx(3.5)
 
 
-def test_least_masses_do_not_swallow_an_edit() -> None:
+def test_least_masses_do_not_undo_an_edit() -> None:
     spec = arm(top='<compiler boundmass="1" boundinertia=".1"/>')
     before = built(spec)
     after = built(spec, Mass("other", to=0.3))
@@ -185,7 +185,7 @@ def test_a_copied_geom_equals_the_original() -> None:
 
 
 def test_a_copy_aims_and_wraps_like_the_original() -> None:
-    """Its camera looks at its own bodies, and its tendon runs around copies on the trunk."""
+    """The copy's camera looks at copied bodies, and its tendon bends around copies on the trunk."""
     tendon = spatial(
         '<site site="bar"/><geom geom="ball"/><site site="middle"/><pulley divisor="2"/>'
         '<site site="shoulder"/><site site="hand"/>'
@@ -208,7 +208,7 @@ def test_a_copy_aims_and_wraps_like_the_original() -> None:
 
 
 def test_a_larger_copy_has_larger_tendons() -> None:
-    """Strengths and lengths of tendons that lie on the limb alone scale with it."""
+    """Strengths and lengths of tendons that lie only on the limb scale with the limb."""
     tendon = spatial(
         '<site site="middle"/><site site="hand"/>',
         'range="0 2" limited="true" springlength="1" stiffness="3"',
@@ -224,7 +224,7 @@ def test_a_larger_copy_has_larger_tendons() -> None:
 
 
 def test_limbs_of_attached_models_keep_their_units() -> None:
-    """Their limits are copied from degrees into a model in radians, and the other way."""
+    """Limits are converted from degrees to radians and from radians to degrees."""
     for inner, outer in (("degree", "radian"), ("radian", "degree")):
         part = spec_of(
             f"""<mujoco><compiler angle="{inner}"/><worldbody><body name="limb">

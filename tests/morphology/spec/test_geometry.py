@@ -1,4 +1,4 @@
-"""Geoms and segments: volume, orientation and size, and what moves along."""
+"""Geoms and segments: volume, orientation, size, and elements that move with a segment."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def test_children_move_along_with_a_stretch() -> None:
     ],
 )
 def test_meshes_and_explicit_inertias_prevent_reshaping(edit: Edit) -> None:
-    """A limb with one can be removed."""
+    """A limb with a mesh or an explicit inertia can still be removed."""
     with pytest.raises(
         MorphologyError, match=r"'link\w*' holds 'horn\w*', a mesh; only spheres, caps"
     ):

@@ -1,4 +1,4 @@
-"""What edits carry along or refuse, one reference at a time; `tests/laws` has them all at once."""
+"""Edits update or refuse references between elements; here one reference at a time."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _AROUND = '<site site="shoulder"/><geom geom="ball" sidesite="out"/><site site="
 _OUT = '<site name="out" pos=".1 .13 0"/>'
 _TIP = '<geom type="capsule" fromto=".3 0 0 .4 0 0" size=".01"/>'
 _SPRING = 'springdamper=".1 1"'
-# What the arm has, the edit, and the sentence that refuses it; none where it is made.
+# An arm, an edit, and the message that refuses the edit; empty if the edit is accepted.
 _REFUSED: list[tuple[mujoco.MjSpec, Edit, str]] = [
     (arm(spatial(ROPE, 'stiffness="1"')), Remove("lower"), ""),
     (arm(lower=_FAR), Cut("lower", 0.5), ""),
@@ -146,7 +146,7 @@ _REFUSED: list[tuple[mujoco.MjSpec, Edit, str]] = [
 def test_an_edit_refuses_what_it_cannot_carry(
     spec: mujoco.MjSpec, edit: Edit, message: str
 ) -> None:
-    """In a sentence that names the holder of the reference; without one the edit is made."""
+    """The message names the element that holds the reference."""
     if not message:
         built(spec, edit)
         return
@@ -165,8 +165,8 @@ _TWO_SUMS = """
 """
 
 
-def test_a_tendon_goes_with_all_of_its_joints() -> None:
-    """With its motor and its sensor; what is coupled to it is held."""
+def test_a_tendon_is_removed_with_the_last_of_its_joints() -> None:
+    """Its motor and its sensor are removed too, and tendons coupled to it are held."""
     model = built(arm(_TWO_SUMS), Lock("upper", 0.2))
     assert (model.ntendon, model.nu, model.nsensor, model.neq) == (1, 0, 0, 1)
     assert model.qpos0[model.joint("other").qposadr[0]] == pytest.approx(0.4)
@@ -176,7 +176,7 @@ def test_a_tendon_goes_with_all_of_its_joints() -> None:
 @pytest.mark.parametrize("locked", ["upper", "lower"])
 @pytest.mark.parametrize("refs", [0.0, 0.3])
 def test_coupled_joints_are_held_at_the_polynomial(locked: str, refs: float) -> None:
-    """A leader holds its follower, and a follower its leader, in a chain of couplings."""
+    """Locking a leader holds its follower, and locking a follower its leader, also in a chain."""
     chain = """<equality>
       <joint joint1="lower" joint2="upper" polycoef="0 .5 0 0 0"/>
       <joint joint1="other" joint2="lower" polycoef="0 -1 .25 0 0"/>
@@ -257,8 +257,8 @@ def test_a_flex_is_not_torn(edit: Edit) -> None:
         built(arm(_CLOTH), edit)
 
 
-def test_a_tuple_loses_what_is_removed() -> None:
-    """Removed elements leave a tuple, which keeps the others."""
+def test_removed_elements_are_removed_from_tuples() -> None:
+    """The tuple keeps its other elements."""
     text = """<custom><tuple name="both"><element objtype="body" objname="lower" prm="1"/>
       <element objtype="body" objname="other" prm="2"/></tuple></custom>"""
     model = built(arm(text), Remove("lower"))
@@ -283,7 +283,7 @@ def test_cameras_and_lights_look_at_the_parent_of_a_removed_limb() -> None:
 
 
 def test_a_loop_may_close_by_a_ball() -> None:
-    """Its keyframe keeps the pose, which is counted from another reference now."""
+    """The keyframe keeps the pose, in numbers relative to the ball's new reference."""
     ball = """<body name="rod" pos="0 0 .2"><joint name="rod" type="ball"/>
       <geom name="rod" type="capsule" fromto="0 0 0 .2 0 0" size=".01"/></body>"""
     pin = """<equality><connect name="pin" body1="rod" body2="trunk" anchor=".2 0 0"/></equality>
@@ -341,7 +341,7 @@ _HOME = '<keyframe><key name="home" qpos="{}"/><key name="moving" qvel="{}"/></k
 
 
 def test_a_placed_trunk_starts_there() -> None:
-    """In every keyframe that gives positions."""
+    """The trunk starts at the new place in every keyframe that gives positions."""
     spec = arm(_HOME.format("1 2 .5 1 0 0 0 .1 .2 .3", "0 " * 9), root='<freejoint name="root"/>')
     height = built(spec, StartHeight("trunk", 0.8))
     np.testing.assert_allclose(height.key_qpos[0, :7], [1.0, 2.0, 0.8, 1.0, 0.0, 0.0, 0.0])
@@ -353,7 +353,7 @@ def test_a_placed_trunk_starts_there() -> None:
 
 
 def test_a_trunk_on_a_slide_starts_at_the_height() -> None:
-    """The keyframe goes to where the model puts the trunk."""
+    """In the keyframe, the trunk has the height at which the model puts it."""
     slide = '<joint name="lift" type="slide" axis="0 0 1" ref=".2"/>'
     spec = arm(_HOME.format("-.3 .1 .2 .3", "0 0 0 0"), root=slide)
     model = built(spec, StartHeight("trunk", 0.8))
@@ -365,7 +365,7 @@ def test_a_trunk_on_a_slide_starts_at_the_height() -> None:
 
 
 def test_a_keyframe_keeps_its_mocap_bodies() -> None:
-    """Their pose there, not the model's."""
+    """A mocap body keeps the pose of the keyframe."""
     spec = arm('<keyframe><key mpos="1 2 3"/></keyframe>')
     spec.worldbody.add_body(name="hand", mocap=True, pos=[0.0, 0.0, 2.0])
     model = built(spec, Mass("lower", scale=2.0))

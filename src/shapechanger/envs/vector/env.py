@@ -139,7 +139,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         options: Sequence[dict[str, Any] | None],
         chosen: Iterable[int] | None = None,
     ) -> tuple[NDArray[Any], list[dict[str, Any]]]:
-        """Start an episode in each env, or in those of some numbers, as `reset` does.
+        """Start an episode in each env, or in the `chosen` ones, as `reset` does.
 
         Returns:
             The observations of all envs, and the info of each, empty if it was not reset.
@@ -327,7 +327,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """Do `work` for some envs in the thread that owns their OpenGL contexts.
 
         Envs whose physics step separately never draw while they step, so the caller's thread draws
-        them. Others may, and then their contexts belong to their thread.
+        them. Other envs may draw while they step, so their contexts belong to their own thread.
         """
         drawn_here = self.closed or all(sub.tuned is not None for sub in self._subs)
         self._threads.do(work, numbers, alone=drawn_here)

@@ -22,7 +22,7 @@ Step = tuple[Any, Any, Any, dict[str, Any]]
 
 
 class InfoColumns(NamedTuple):
-    """Infos of envs that have the same keys, and no infos within."""
+    """Infos of envs that have the same keys, and no nested infos."""
 
     numbers: Sequence[int]
     """The numbers of the envs, ascending."""
@@ -31,7 +31,7 @@ class InfoColumns(NamedTuple):
 
 
 def in_columns(infos: Mapping[int, Mapping[str, Any]]) -> list[InfoColumns]:
-    """Group infos, keyed by the number of the env; a nested info forms a separate group."""
+    """Group infos, keyed by the number of the env; infos with nested ones are not grouped."""
     groups: dict[Any, list[int]] = {}
     for number, info in infos.items():
         nested = any(isinstance(value, dict) for value in info.values())
@@ -46,8 +46,8 @@ def batched(envs: VectorEnv[Any, Any, Any], parts: Iterable[InfoColumns]) -> dic
     """Return the infos of all envs as Gymnasium's vector envs do.
 
     For each key there is an array of one entry per env, and under `_key` a mask of the envs with an
-    entry. Gymnasium adds one env after another; here it adds the first env of each part, which
-    makes the arrays, and the others are added together, in a tenth of the time.
+    entry. Gymnasium's method adds one env after another. Here it adds only the first env of each
+    part, which makes the arrays; the others are added together, in a tenth of the time.
     """
     batch: dict[str, Any] = {}
     add: Any = cast("Any", envs)._add_info
@@ -126,8 +126,8 @@ class SubEnv:
 
     A simulation has diverged when the env's info says so, when MuJoCo found a position, velocity or
     acceleration that is huge or not finite, or when an observation is not finite. MuJoCo then
-    restarts from the model's own pose, which the action did not cause: the env is terminated, the
-    reward is 0, and the info has `diverged`. Observations that are not finite read 0.
+    restarts from the model's own pose. The env is terminated, the reward is 0, and the info has
+    `diverged`. Numbers of the observation that are not finite are replaced by 0.
 
     Attributes:
         tuned: The env without its time limit if its physics can be stepped separately, else None.

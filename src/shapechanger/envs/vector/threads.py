@@ -66,7 +66,7 @@ class EnvThreads:
         """Do `work` for the envs of some numbers, and return when all of it has ended.
 
         Args:
-            work: Takes the number of an env.
+            work: Function of the number of an env.
             numbers: Numbers of envs whose thread must do it.
             anywhere: Numbers of envs that the first free thread takes.
             alone: Whether the caller's thread does all of it.

@@ -1,6 +1,6 @@
-"""Rewards and observations computed for many ants at once equal single envs' results.
+"""`AntEnv.conclude` gives many ants of a vector env the results that each would compute alone.
 
-`AntEnv.conclude` computes them after the physics, for all envs of one kind in a vector env.
+It computes observations, rewards, ends and infos in one call, after all ants' physics has stepped.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def concluded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Record the number of ants in each call of `AntEnv.conclude`."""
+    """Return a list of the number of ants in each call of `AntEnv.conclude`."""
     counts: list[int] = []
     original = AntEnv.conclude
 
@@ -44,7 +44,7 @@ def concluded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def _pair(each: list[dict[str, Any]], threads: int = 1, mode: str = "NextStep") -> tuple[Any, Any]:
-    """Return our vector env with fast models, and Gymnasium's over the same envs without."""
+    """Return our vector env with fast models, and Gymnasium's with the same envs without them."""
     ours = ThreadVectorEnv(
         [partial(gym.make, _ANT, **one) for one in each],
         threads=threads,
@@ -90,7 +90,7 @@ def test_bodies_and_rewards_may_differ(mode: str, threads: int, concluded: list[
 def test_precision_and_order_of_actions(
     kind: Any, order: Any, arguments: dict[str, Any], concluded: list[int]
 ) -> None:
-    """Costs are summed in the actions' precision, whichever parts the observations have."""
+    """Costs are summed in the precision of the actions, in any order of memory."""
     ours, theirs = _pair([arguments] * 5)
     for envs in (ours, theirs):
         envs.reset(seed=0)
@@ -163,6 +163,7 @@ def test_overridden_steps_are_called() -> None:
 def test_an_ant_that_another_thread_still_steps_is_not_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """`conclude` waits for an ant of the own thread that the other thread has taken over."""
     ours, theirs = _pair([{}] * 4, threads=2)
     require_same(ours.reset(seed=0), theirs.reset(seed=0))
     actions = np.full((4, 8), 0.5, np.float32)
@@ -184,7 +185,7 @@ def test_an_ant_that_another_thread_still_steps_is_not_read(
         move_second()
 
     def of_the_other() -> None:
-        assert begun.wait(20.0)  # Nothing to help with before that.
+        assert begun.wait(20.0)  # The thread must not take ants of the other thread before that.
         move_third()
 
     monkeypatch.setattr(first, "move", own)

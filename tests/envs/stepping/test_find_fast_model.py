@@ -1,4 +1,4 @@
-"""`find_fast_model`: the cheaper models that it finds move bit-equally, and when it finds none."""
+"""`find_fast_model` finds a cheaper MuJoCo model that moves equally to the last bit, or none."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _fast_model_of(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, mujoco.MjModel 
     return model, find_fast_model(model, spec.copy)
 
 
-def _knows_its_pairs(model: mujoco.MjModel) -> bool:
+def _has_explicit_pairs(model: mujoco.MjModel) -> bool:
     return bool(model.npair) and not model.geom_contype.any()
 
 
@@ -73,7 +73,7 @@ def test_one_tree_on_a_floor_has_explicit_pairs() -> None:
     """Explicit pairs replace the contact search, and the public model is unchanged."""
     model, fast = _fast_model_of(_scene())
     assert fast is not None
-    assert _knows_its_pairs(fast)
+    assert _has_explicit_pairs(fast)
     assert fast.npair == 3
     assert fast.opt.disableflags & _ISLAND
     assert not model.npair
@@ -129,7 +129,7 @@ def test_a_fast_model_moves_as_its_model(floor: str, trunk: str, legs: str, add:
         feature(spec)
     model, fast = _fast_model_of(spec)
     assert fast is not None
-    assert _knows_its_pairs(fast)
+    assert _has_explicit_pairs(fast)
     assert fast.npair == 3
     _roll(model, fast, 120)
 
