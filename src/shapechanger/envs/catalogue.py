@@ -190,7 +190,7 @@ def register_all() -> None:
         (REMOTE_VEHICLE, "robot.client.env:RemoteVehicleEnv", None),
         (REMOTE_WAYPOINT, "vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):
-        _register(env_id, f"shapechanger.{entry_point}", steps, nondeterministic=True)  # Hardware.
+        _register(env_id, f"shapechanger.{entry_point}", steps, nondeterministic=True)
 
 
 def _register(env_id: str, entry_point: str, steps: int | None = 1000, **more: Any) -> None:

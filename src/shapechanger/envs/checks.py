@@ -32,7 +32,7 @@ def check_action(env: Any, action: Any) -> NDArray[Any]:
     """Return an action as an array.
 
     Args:
-        env: The env that takes it, with an `action_layout`.
+        env: The env, which has an `action_layout`.
         action: The action, of any dtype.
 
     Raises:
@@ -52,7 +52,7 @@ def check_action(env: Any, action: Any) -> NDArray[Any]:
     if not finite.all():
         place = int(np.argmin(finite))
         raise BadAction(
-            f"{name} takes finite actions, got {array[place]} for "
+            f"{name} needs finite actions, got {array[place]} for "
             f"{env.action_layout.names[place]}, number {place} of the action."
         )
     return array
@@ -75,9 +75,9 @@ def check_actions(
     try:
         given = np.asarray(actions)
     except ValueError as error:
-        raise BadAction(f"Actions have the shape {shape} each, got several shapes.") from error
+        raise BadAction(f"Actions must have the shape {shape} each, got several.") from error
     if given.shape != (num_envs, *shape):
-        raise BadAction(f"Actions have the shape {(num_envs, *shape)}, got {given.shape}.")
+        raise BadAction(f"Actions must have the shape {(num_envs, *shape)}, got {given.shape}.")
     if given.dtype.kind not in _BATCH_NUMBERS:
         raise BadAction(f"Actions must be numbers, got {given.dtype}.")
     if not np.logical_and.reduce(np.isfinite(given), axis=None):

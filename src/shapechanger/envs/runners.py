@@ -215,10 +215,9 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.1 sum(action^2)`.
 
     ## Start
-    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
-    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.1) on
-    positions, and normal noise of this standard deviation on velocities. Joints stay inside their
-    limits and feet above the floor.
+    Gymnasium's pose, with joints beyond a limit moved to this limit and the trunk high enough for
+    the feet, with uniform noise of `reset_noise_scale` (0.1) on positions, and normal noise of this
+    standard deviation on velocities. Joints stay inside their limits and feet above the floor.
 
     ## End
     Never terminated; truncated after 1,000 steps.
@@ -281,9 +280,9 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     minus `0.001 sum(action^2)`.
 
     ## Start
-    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
-    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.005). Joints
-    stay inside their limits and feet above the floor.
+    Gymnasium's pose, with joints beyond a limit moved to this limit and the trunk high enough for
+    the feet, with uniform noise of `reset_noise_scale` (0.005). Joints stay inside their limits and
+    feet above the floor.
 
     ## End
     Terminated when the torso is below 0.7 m or leans by more than 0.2 rad, or a number of the state
@@ -350,9 +349,9 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     minus `0.001 sum(action^2)`.
 
     ## Start
-    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
-    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.005). Joints
-    stay inside their limits and feet above the floor.
+    Gymnasium's pose, with joints beyond a limit moved to this limit and the trunk high enough for
+    the feet, with uniform noise of `reset_noise_scale` (0.005). Joints stay inside their limits and
+    feet above the floor.
 
     ## End
     Terminated when the torso is below 0.8 m or above 2 m, or leans by more than 1 rad. For other

@@ -145,7 +145,7 @@ def _moving_dofs(model: mujoco.MjModel) -> NDArray[np.bool_]:
 
 
 def _travelling_joints(model: mujoco.MjModel) -> list[int]:
-    """Return the robot's free joints or, without one, slides without limits on the world."""
+    """Return the robot's free joints or, if it has none, its slides without limits on the world."""
     slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
     slides &= _moving_dofs(model)[model.jnt_dofadr]
     slides &= model.body_parentid[model.jnt_bodyid] == 0
@@ -289,7 +289,7 @@ class StartRules:
         return min(gaps, default=_FAR_M)
 
     def feasible(self, drawn: _Array, data: mujoco.MjData, start: _Array | None = None) -> _Array:
-        """Return the feasible pose next to a drawn one, (nq,); the pose in `data` is overwritten.
+        """Return a feasible pose near a drawn one, (nq,); the pose in `data` is overwritten.
 
         Joints are moved inside their limits, orientations normalised, equalities satisfied as well
         as they are at the pose `start` (nq,), by default the model's own, and a trunk whose feet
@@ -310,7 +310,7 @@ class StartRules:
         return pose
 
     def still(self, pose: _Array, velocity: _Array, data: mujoco.MjData) -> _Array:
-        """Return the velocity (nv,) nearest to a drawn one that keeps a pose (nq,) closed."""
+        """Return the velocity (nv,) nearest to a drawn one that violates no equality at a pose."""
         if not self._model.neq:
             return velocity
         self._violation(pose, data)

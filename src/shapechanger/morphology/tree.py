@@ -1,7 +1,7 @@
 """The kinematic tree of a body: its trunk, its limbs, and numbers that describe each.
 
-A policy for many bodies observes them in addition to the state: N. Bohlinger and others, One
-Policy to Run Them All, CoRL 2024, and A. Gupta and others, MetaMorph, ICLR 2022.
+A policy for many bodies observes these numbers in addition to the state: N. Bohlinger and others,
+One Policy to Run Them All, CoRL 2024, and A. Gupta and others, MetaMorph, ICLR 2022.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ class Limb(msgspec.Struct, frozen=True):
         joint: Name of the hinge or slide.
         bodies: Names of the body that the joint moves and of bodies fixed to it; empty if a later
             joint of the same body lists them.
-        actuator: Name of the actuator that moves the joint, or "". An actuator of
-            a tendon, site or body is assigned to the joint that it turns most in the start pose, of
-            all joints without an actuator; of equal joints, to the one nearest to the trunk.
+        actuator: Name of the actuator that moves the joint; "" if no actuator moves it. An actuator
+            of a tendon, site or body is assigned to one of the joints without an actuator: the one
+            that it turns most in the start pose, and of equal ones the nearest to the trunk.
         numbers: Description of the limb, see `LIMB_NUMBERS`.
     """
 

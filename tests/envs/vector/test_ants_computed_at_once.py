@@ -163,7 +163,7 @@ def test_overridden_steps_are_called() -> None:
 def test_an_ant_that_another_thread_still_steps_is_not_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """`conclude` waits for an ant of the own thread that the other thread has taken over."""
+    """Results are computed when both threads are done, also for an ant that changed threads."""
     ours, theirs = _pair([{}] * 4, threads=2)
     require_same(ours.reset(seed=0), theirs.reset(seed=0))
     actions = np.full((4, 8), 0.5, np.float32)

@@ -198,12 +198,12 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return self._present_observations(), results
 
     def _advance(self, actions: NDArray[Any], waiting: list[bool], results: StepResults) -> None:
-        """Reset the envs that wait for it, and step the others.
+        """Reset the envs that wait for a reset, and step the others.
 
-        Envs whose physics can be stepped separately have their results computed together, after
-        all threads are done; all others take their whole step.
+        Envs whose physics can be stepped separately step their physics first; their results are
+        computed together when all threads are done. The other envs take their whole step.
         """
-        # Binding, and state from before the physics, of each env whose physics has stepped.
+        # For each env whose physics has stepped: its binding, and its state before the physics.
         moved: list[Any] = [None] * self.num_envs
 
         def advance(i: int) -> None:

@@ -71,7 +71,7 @@ def batched(envs: VectorEnv[Any, Any, Any], parts: Iterable[InfoColumns]) -> dic
 class StepResults:
     """Results of one step of all envs; threads may fill in different envs at the same time.
 
-    Infos that arrive in columns stay columns until they are needed env by env.
+    Infos in columns stay in columns until `of_each` splits them by env.
 
     Attributes:
         rewards: Shape (n,).
@@ -97,7 +97,7 @@ class StepResults:
     def put_columns(
         self, numbers: Sequence[int], rewards: Any, terminated: Any, truncated: Any, infos: Any
     ) -> None:
-        """Set the results of several envs, an array each, and their infos in columns."""
+        """Set the results of several envs from arrays, and their infos from columns."""
         where: Any = slice(None) if len(numbers) == self.rewards.size else numbers
         self.rewards[where], self.terminated[where] = rewards, terminated
         self.truncated[where] = truncated
@@ -124,8 +124,8 @@ class StepResults:
 class SubEnv:
     """One env of a vector env, which writes its observations into a row of a batch.
 
-    A simulation has diverged when the env's info says so, when MuJoCo found a position, velocity or
-    acceleration that is huge or not finite, or when an observation is not finite. MuJoCo then
+    A simulation has diverged if the env's info has `diverged`, if MuJoCo found a position, velocity
+    or acceleration that is huge or not finite, or if an observation is not finite. MuJoCo then
     restarts from the model's own pose. The env is terminated, the reward is 0, and the info has
     `diverged`. Numbers of the observation that are not finite are replaced by 0.
 

@@ -10,10 +10,10 @@ from itertools import pairwise
 from queue import SimpleQueue
 from typing import Final
 
-# A job of a worker, with the queue that receives None at its end.
+# A job of a worker, and the queue that receives None when the job has ended.
 _Task = tuple[Callable[[], None], SimpleQueue[None]]
 
-# Time limit for the end of a thread, s; it only has to finish a step.
+# Longest wait for the end of a thread, s; a thread only has to finish a step.
 _END_WITHIN_S: Final = 5.0
 
 
@@ -63,13 +63,13 @@ class EnvThreads:
         anywhere: Iterable[int] = (),
         alone: bool = False,
     ) -> None:
-        """Do `work` for the envs of some numbers, and return when all of it has ended.
+        """Do `work` for some envs, and return when it has ended for all of them.
 
         Args:
             work: Function of the number of an env.
-            numbers: Numbers of envs whose thread must do it.
-            anywhere: Numbers of envs that the first free thread takes.
-            alone: Whether the caller's thread does all of it.
+            numbers: Numbers of envs whose own thread must do the work.
+            anywhere: Numbers of envs for which the first free thread does the work.
+            alone: Whether the caller's thread does the work for all envs.
 
         Raises:
             BaseException: The exception of the first env that failed, with a note that names the
@@ -88,7 +88,7 @@ class EnvThreads:
         def work_through(thread: int) -> None:
             for number in parts[thread]:
                 attempt(number)
-            # Threads rarely take equally long. They take envs from both ends, each env once.
+            # Threads rarely take equally long, so they share a queue and pop envs from both ends.
             take = queue.pop if thread % 2 else queue.popleft
             while True:
                 try:
@@ -105,7 +105,7 @@ class EnvThreads:
             work_through(0)
             for _ in workers:
                 done.get()
-        except BaseException:  # It is unknown which jobs were handed over.
+        except BaseException:  # It is unknown which jobs the threads have received.
             self._settle(workers)
             raise
         if failures:
@@ -114,7 +114,7 @@ class EnvThreads:
             raise failure
 
     def _settle(self, workers: list[_Worker]) -> None:
-        """Wait until each thread has done an empty job, unless a second interruption ends it."""
+        """Wait until each thread has done an empty job; a second interruption ends the wait."""
         settled: SimpleQueue[None] = SimpleQueue()
         try:
             for worker in workers:
@@ -135,7 +135,7 @@ class EnvThreads:
                 worker.join(_END_WITHIN_S)
 
     def _awake(self) -> list[_Worker]:
-        """Return the threads, started if they are not alive."""
+        """Return the threads, and start them if they are not alive."""
         if not all(worker.is_alive() for worker in self._workers):
             self._workers = []  # pragma: no cover  # After a fork; tested in a subprocess.
         while len(self._workers) < len(self._parts) - 1:

@@ -49,8 +49,8 @@ _GROWTH: Final = 1e4
 class Rollout(msgspec.Struct, frozen=True):
     """Comparison of the responses of two environments to the same commands.
 
-    It also shows differences outside the compiled model: in sensor noise and delay, the start and
-    the reward.
+    It also shows differences that are not in the compiled model: noise and delay of sensors, the
+    start and the reward.
 
     Attributes:
         steps: Commands given before the first of the two ended its episode.
@@ -321,9 +321,7 @@ def _flat(observation: Any) -> _Floats:
     if isinstance(observation, Mapping):
         parts = cast("Mapping[str, Any]", observation)
         return np.concatenate([_flat(parts[key]) for key in sorted(parts)])
-    return np.array(
-        observation, np.float64
-    ).ravel()  # A copy, because the env may reuse its memory.
+    return np.array(observation, np.float64).ravel()  # A copy: the env may reuse its memory.
 
 
 def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None) -> tuple[str, ...]:

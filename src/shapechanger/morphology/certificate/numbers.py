@@ -16,7 +16,7 @@ Measured, and easy to get wrong:
 - adhesions add up unless one geom has the higher priority;
 - a friction coefficient is never below 1e-5;
 - a time constant below two time steps counts as two time steps, unless the model switches
-  `refsafe` off or integrates with `discrete`: softer than that is possible, harder is not.
+  `refsafe` off or integrates with `discrete`: contacts can be softer, but not harder.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ TABLE: Final[dict[str, Any]] = tomllib.loads(
     Path(__file__).with_name("fields.toml").read_text(encoding="utf-8")
 )
 MOVED: Final = msgspec.convert(TABLE["moved"], dict[str, dict[str, Field]])
-"""Sections of what decides the motion; `derived` constants of `mujoco.mj_setConst` follow them."""
+"""Quantities that decide the motion, by section; constants that MuJoCo derives are not included."""
 _IN_ORDER: Final = ("joints", "actuators")
 
 KINDS: Final = {
