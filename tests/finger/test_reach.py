@@ -101,7 +101,7 @@ def test_goal_rewards_match_compute_reward() -> None:
 @pytest.mark.parametrize(
     ("action", "sentence"),
     [
-        (np.array([0, 0, 0, np.nan, 0, 0, 0]), "needs finite actions, got nan for EDC/command"),
+        (np.array([0, 0, 0, np.nan, 0, 0, 0]), "takes finite actions, got nan for EDC/command"),
         (np.zeros(6), r"takes actions of shape \(7,\), got \(6,\)"),
         (np.array(["a"] * 7), "takes numbers as actions"),
     ],

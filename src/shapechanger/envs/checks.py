@@ -52,7 +52,7 @@ def check_action(env: Any, action: Any) -> NDArray[Any]:
     if not finite.all():
         place = int(np.argmin(finite))
         raise BadAction(
-            f"{name} needs finite actions, got {array[place]} for "
+            f"{name} takes finite actions, got {array[place]} for "
             f"{env.action_layout.names[place]}, number {place} of the action."
         )
     return array

@@ -28,7 +28,7 @@ _LOOKS_EVERY: Final = 256
 
 _Result = TypeVar("_Result")
 Tensors = Tensor | tuple[Tensor, ...]
-"""One tensor with a row per world, or one per batch where the spaces of the batches differ."""
+"""One tensor with a row per world, or one per batch if the spaces of the batches differ."""
 
 
 class WarpVectorEnv(VectorEnv[Any, Any, Any]):

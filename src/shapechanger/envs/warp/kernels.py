@@ -8,7 +8,7 @@ OOPSLA 2014), with 53 bits each.
 Two private functions of mujoco-warp 4.0 differ from MuJoCo or ignore differing bodies:
 
 - **Contacts of capsules with planes.** MuJoCo turns the pyramid of friction of such a contact along
-  the capsule. mujoco-warp does so only where the capsule leans by more than 30 degrees from the
+  the capsule. mujoco-warp does so only if the capsule leans by more than 30 degrees from the
   plane's normal, and along the world's axes for steeper ones, which turns the pyramid by up to 45
   degrees: an ant's step with a steep shank on the floor then differs by a third in some velocities.
   With elliptic cones, whose friction has no direction, both agree to 1e-5.

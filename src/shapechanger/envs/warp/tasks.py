@@ -275,7 +275,7 @@ class DeviceRunner(DeviceTask):
         return torch.cat([self.qpos[:, hidden:], velocities], dim=1)
 
     def _healthy(self) -> Tensor:
-        """Return whether each body is healthy, within heights where it has any, shape (n,)."""
+        """Return whether each body is healthy, shape (n,): within its heights, if it has limits."""
         height, constants = self.qpos[:, self.height_at], self.constants
         if "low" not in constants:
             return torch.ones_like(height, dtype=torch.bool)

@@ -177,7 +177,7 @@ class Worlds(ABC):
         return view[None] if name == ARMS else view
 
     def _field(self, name: str) -> tuple[Any, str]:
-        """Return where a field of the model is, and its name there."""
+        """Return the object that has a field of the model, and the name of the field in it."""
         part, _, field = name.rpartition(".")
         return (self._model.opt if part else self._model), field
 
@@ -355,7 +355,7 @@ def _stacked(arrays: Sequence[NDArray[Any]], like: Tensor) -> Tensor:
 
 
 def _room(model: mujoco.MjModel, pairs: NDArray[Any]) -> dict[str, int]:
-    """Return the most contacts and rows of constraints where pairs, (k, 2), of geoms can touch."""
+    """Return the largest number of contacts and constraint rows if these pairs (k, 2) can touch."""
     contacts = rows = 0
     for pair in pairs.tolist():
         kinds = {geom_type(model, geom) for geom in pair}
