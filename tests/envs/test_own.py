@@ -330,7 +330,6 @@ def test_observed_numbers_must_exist(dog: Path) -> None:
 
 
 def test_models_that_do_not_compile_are_refused(dog: Path) -> None:
-    """The message has MuJoCo's reason."""
     dog.write_text(
         DOG.replace('name="front" pos', 'name="paw" pos').replace(' mass="3"', ' mass="0"')
     )

@@ -123,7 +123,6 @@ _BODIES: Final = (
 
 
 def _entry(name: str, family: str, summary: str) -> CatalogueEntry:
-    """Return the entry of a body."""
     entry_point, learner, threshold = _FAMILIES[family]
     place = f"shapechanger.envs.{entry_point}"
     return CatalogueEntry(name, family, summary, place, learner, threshold)

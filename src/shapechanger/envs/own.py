@@ -170,7 +170,6 @@ def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
 
 
 def _described(name: str) -> Path:
-    """Return the file of a robot of `robot_descriptions`."""
     if importlib.util.find_spec(_PACKAGE) is None:
         raise MorphologyError(
             f"{name} looks like a robot of the package {_PACKAGE}, which is not installed: run "
@@ -396,7 +395,6 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return np.concatenate([data.qpos, data.qvel, data.cfrc_ext[1:].ravel()])
 
     def _number(self, name: str) -> float:
-        """Return the observable number with a name."""
         if name not in self._place_of:
             raise UnknownName(f"number of {self.family.name}", name, self._place_of)
         return float(self._all_numbers()[self._place_of[name]])

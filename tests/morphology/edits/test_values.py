@@ -192,7 +192,6 @@ def test_motors_are_as_strong_as_the_model_allows() -> None:
 
 
 def test_a_motor_of_a_tendon_is_not_a_motor_of_the_joint_of_the_same_name() -> None:
-    """`AddMotor` still adds a motor to the joint."""
     spec = spec_of(
         """
         <mujoco><worldbody>

@@ -311,7 +311,6 @@ class TunedStep(Reshapable):
         raise NotImplementedError
 
     def _advance(self, bound: Any, action: Any) -> StepResult:
-        """Take one step."""
         raise NotImplementedError
 
     def _ready(self) -> Any:

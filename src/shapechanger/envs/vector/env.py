@@ -333,7 +333,6 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self._threads.do(work, numbers, alone=drawn_here)
 
     def _of_each(self, work: Callable[[int], Any]) -> tuple[Any, ...]:
-        """Return the result of `work` for each env."""
         found: list[Any] = [None] * self.num_envs
 
         def ask(i: int) -> None:

@@ -226,7 +226,6 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         return [seen for seen, _ in starts], infos
 
     def _each(self, work: Callable[[Worlds], _Result]) -> list[_Result]:
-        """Return the result of `work` for each batch."""
         return at_once([partial(work, batch) for batch in self.batches], self.device)
 
     @without_gradients()
