@@ -72,14 +72,16 @@ def mutants() -> Iterator[Row]:
     survivors: list[str] = []
     for name in MODULES:
         counts: Counter[str] = Counter()
+        found: list[str] = []
         for path in sorted((_SRC / MODULES[name]).rglob("*.py.meta")):
             for function, line, status in _judged(path, equivalent):
                 counts[status] += 1
                 if status == "survived":
-                    survivors.append(f"- `{function}`: `{line}`")
+                    found.append(f"- `{function}`: `{line}`")
         killed, alive = counts["killed"], counts["survived"]
-        if not killed + alive:
+        if counts["did not run"] or not killed + alive:
             continue
+        survivors += found
         share = killed / (killed + alive)
         page.append(
             f"| {name} | {killed} of {killed + alive} ({share:.1%}) | {alive} | "
@@ -104,6 +106,7 @@ def _judged(path: Path, equivalent: set[tuple[str, str]]) -> Iterator[tuple[str,
     functions = {n.name: n for n in ast.walk(source) if isinstance(n, ast.FunctionDef)}
     for key, code in json.loads(path.read_text())["exit_code_by_key"].items():
         if code is None:
+            yield "", "", "did not run"
             continue
         mangled = key.rpartition(".")[2]
         original = functions[mangled.rpartition("__mutmut_")[0] + "__mutmut_orig"]
