@@ -235,7 +235,7 @@ def test_the_inverse_prefers_the_copy_of_the_same_name() -> None:
     assert [entry.rule for entry in back.observation] == [Copy("z")]
     feet = Layout((motor("foot"), motor("toe")))
     there = carts(Layout((motor("ankle"),)), feet, rules={"*/motor": "copy ankle/motor"})
-    with pytest.raises(MapError, match="is copied to 'foot/motor' and 'toe/motor', none"):
+    with pytest.raises(MapError, match="is copied to 'foot/motor' and 'toe/motor', and none"):
         there.inverse()
 
 

@@ -173,7 +173,7 @@ def test_exact_names_come_before_partners_and_these_before_globs(
     [
         ({"rules": {"foot_*": Hold(3.0)}}, MapError, "'foot_4/motor' cannot hold 3: .* -1 to 1"),
         ({"otherwise": Hold(3.0)}, MapError, "cannot hold 3"),
-        ({"otherwise": "copy hip_1/motor"}, MapError, "'hold' or 'learn', not 'copy hip_1/motor'"),
+        ({"otherwise": "copy hip_1/motor"}, MapError, "'hold' or 'learn', got 'copy hip_1/motor'"),
         (
             {"rules": {"tail/*": "zero", "hip_1/motor": "zero"}},
             UnknownName,
@@ -344,7 +344,7 @@ def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -
         ("unit = 'same'", "No key matches 'unit'. Did you mean 'units'?"),
         ("\ufeffunits = 'torq'", "units: No word matches 'torq'. Did you mean 'torque'?"),
         ("units = 3", "'map' is wrong: Expected `str`, got `int` - at `$.units`"),
-        ("otherwise = 'copy hip_1/motor'", "'zero', 'hold' or 'learn', not 'copy"),
+        ("otherwise = 'copy hip_1/motor'", "'zero', 'hold' or 'learn', got 'copy"),
         ("otherwise = 'lern'", "otherwise: No word matches 'lern'. Did you mean 'learn'?"),
         ("action = 3", "at `$.action`"),
         ("[action]\n'foot_1/motor' = 3", "'foot_1/motor' is wrong: Expected `object`"),
