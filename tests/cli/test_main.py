@@ -131,7 +131,7 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
         ("play Ant --policy none.safetensors", "There is no policy file none.safetensors"),
         ("play Ant --policy referense", "did you mean reference?"),
         ("play Ant --episodes 0", "must be at least 1"),
-        ("train Ant --seed -1", "A seed is a whole number from 0"),
+        ("train Ant --seed -1", "A seed must be a whole number from 0"),
         ("transfer Ant BigAnt --map m --rule a=b", "leave out --rule"),
         (
             "transfer Ant BigAnt --arms scratch fine-tune fine-tune",

@@ -69,7 +69,7 @@ def test_a_path_that_leaves_the_workspace_is_refused(place: tuple[float, float, 
     path = circle(0.012, place, hz=1.5)
     with pytest.raises(PathError, match="The path leaves the finger's reach: at ") as caught:
         FingerTrackEnv(path=path)
-    pattern = r"at ([\d.]+) s it is at \((.*), (.*), (.*)\) mm"
+    pattern = r"at ([\d.]+) s the point \((.*), (.*), (.*)\) mm"
     at, *point = (float(number) for number in re.findall(pattern, str(caught.value))[0])
     np.testing.assert_allclose(point, 1e3 * path.at(at), atol=1.0)
     assert angles_for(path.at(at))[1] > 4e-4

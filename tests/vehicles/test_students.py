@@ -73,7 +73,7 @@ def test_unsuitable_teachers_are_refused(teacher: TrainedPolicy) -> None:
     ("arguments", "sentence"),
     [
         ("--teacher none.safetensors", "shapechanger train CarRanges"),
-        (f"--teacher {__file__} --learner cloning", "give --teacher without one"),
+        (f"--teacher {__file__} --learner cloning", "--teacher excludes --learner"),
     ],
 )
 def test_unsuitable_arguments_are_refused_before_the_training(

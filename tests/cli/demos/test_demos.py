@@ -237,7 +237,7 @@ def test_an_expert_corrects_a_policy(tmp_path: Path, demos: Cli) -> None:
         (["Car", "--corrected-by", "expert"], "Only a policy can be corrected"),
         (["Car", "--corrected-by", "me"], "corrected by expert"),
         (["Car", "--options", '{"colour": 3}'], "colour"),
-        (["Car", "--seed", "-1"], "A seed is"),
+        (["Car", "--seed", "-1"], "A seed must be"),
         (["Ant", "--put-back"], "need a vehicle's env"),
     ],
 )

@@ -59,7 +59,7 @@ def test_answers_are_checked(
     RobotInit().run()
     said = capsys.readouterr().out
     for text in (
-        "  car         The New Bright car of 2017: two small motors",
+        "  car         The New Bright car of the original release (2017)",
         "select one of the available options",
         "Next: shapechanger robot install rover.toml",
     ):

@@ -91,7 +91,7 @@ MISTAKES = (
     ("serve finger --twin --port 0 --finger-seed 3", "--finger-seed needs --gap"),
     ("serve finger --twin --port 0 --gap real-lik", "Did you mean 'real-like'?"),
     ("serve finger --twin --port 0 --gap wide --world room", "Give --gap or --world, not both"),
-    ("serve test-car.toml --twin --port 0 --gap wide", "A --gap is between fingers"),
+    ("serve test-car.toml --twin --port 0 --gap wide", "--gap must be used with a finger"),
     ("serve test-car.toml --twin --seed -1", "A seed must be a whole number from 0 to"),
     (f"serve finger --twin --gap wide --finger-seed {2**32}", "A seed must be a whole number"),
     ("check test-car.toml", "lift its wheels"),

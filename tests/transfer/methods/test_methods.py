@@ -87,7 +87,7 @@ def test_names_are_taken_once(no_other: dict[str, type[Method]]) -> None:
         register(Second)
     with pytest.raises(StudyError, match="already a method 'random'"):
         register(Random)
-    with pytest.raises(StudyError, match="made of letters"):
+    with pytest.raises(StudyError, match="must have only letters"):
         register(Spaced)
     assert isinstance(load_method("mine"), First)
     no_other["broken"] = Path  # type: ignore[assignment]

@@ -80,7 +80,7 @@ def test_every_course_is_seen_by_the_camera_of_the_profile(by: str, tmp_path: Pa
 def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path, sensed: bool) -> None:
     profile = _profile(tmp_path, CameraPlan("v4l2", (160, 120), pitch_deg=0.0, fovy_deg=41.0))
     message = (
-        r"car.toml: .* 41 degrees misses 20 % .* wider frames, of its whole sensor, or a wider"
+        r"car.toml: .* 41 degrees misses 20 % .* wider frames from its whole sensor, or a wider"
     )
     with pytest.raises(ProfileError, match=message):
         WaypointEnv("car", robot=profile, sensed=sensed)
