@@ -24,7 +24,8 @@ def _project(folder: Path) -> dict[str, Any]:
 def test_imported_names_exist(file: Path) -> None:
     """A name that is renamed here is renamed there too.
 
-    The package's tests import from `tests` here without that name, because draccus takes it.
+    Tests of the package import `robot` and not `tests.robot`, because draccus installs a package
+    `tests`.
     """
     for node in ast.walk(ast.parse(file.read_text())):
         module = (isinstance(node, ast.ImportFrom) and node.module) or ""

@@ -32,7 +32,7 @@ _MICRO = 1e-6
 
 
 def test_arms_that_do_not_span_are_detected() -> None:
-    """Only arms that span all torques have a co-contraction of tensions without a torque."""
+    """Arms span all torques if they have full rank and a co-contraction without a torque."""
     tensions = co_contraction(MOMENT_ARMS)
     assert tensions is not None
     assert spans_all_torques(MOMENT_ARMS)
@@ -133,7 +133,7 @@ _FDS, _DI = 1, 5
 
 def test_moment_arms_follow_from_measured_forces() -> None:
     aside, along, across, torque = map(np.array, (_ASIDE, _ALONG, _ACROSS, _TORQUE))
-    # Two tendons have no arm at the last joint, which gives its position relative to the tip.
+    # Two tendons exert no torque on the last joint: this gives its position relative to the tip.
     y = torque[_DI] / across[_DI]
     z = (torque[_FDS] - y * across[_FDS]) / -along[_FDS]
     assert math.hypot(y, z) == pytest.approx(0.016, abs=1e-4)

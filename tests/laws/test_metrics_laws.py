@@ -143,7 +143,7 @@ def test_a_better_arm_never_gains_less(
 @law
 @given(pair=pairs(), threshold=heights, source=source_steps)
 def test_restricted_times_stay_within_the_budget(pair: Pair, threshold: float, source: int) -> None:
-    """Restricted means and medians lie in [0, H], and other seeds are censored."""
+    """Times lie in [0, horizon]; seeds that never reach the threshold are censored."""
     arm, scratch = pair
     counted = in_total_steps(arm, source, -1e4)
     times = time_to_threshold(counted, scratch, threshold)

@@ -31,7 +31,7 @@ from shapechanger.transfer.references import FOLDER, load_references, reference_
 
 @given(st.sets(st.integers(0, 99_999), min_size=2, max_size=2), st.integers(1, 10_000))
 def test_each_finger_of_a_gap_is_judged_on_targets_of_its_own(pair: set[int], many: int) -> None:
-    """No episode of one finger is another's, and both are the same at every call."""
+    """Two fingers share no seed of an episode."""
     first, second = (
         evaluation_seed(EnvRef("shapechanger/Finger-v1", {"gap": "wide", "finger_seed": i}), many)
         for i in sorted(pair)
@@ -43,7 +43,7 @@ def test_each_finger_of_a_gap_is_judged_on_targets_of_its_own(pair: set[int], ma
 @pytest.mark.parametrize("seed", [0, 99_999, 100_000, 2**32 - 1])
 @pytest.mark.parametrize("kwargs", [{}, {"finger_seed": None}])
 def test_every_seed_of_a_finger_gives_seeds_that_exist(seed: int, kwargs: dict[str, Any]) -> None:
-    """Seeds of episodes stay below 2^32; without individuals they equal any env's."""
+    """Seeds of episodes stay below 2^32; an env without `finger_seed` has the common seed."""
     env = EnvRef("shapechanger/Finger-v1", kwargs)
     assert evaluation_seed(env, 60) == EVALUATION_SEED
     assert 0 <= evaluation_seed(env.having({"finger_seed": seed}), 10**9) < 2**32
@@ -167,7 +167,7 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
     assert (policy.card.steps, policy.card.seed) == (reference.steps, reference.policy_seed)
     assert policy.card.learner == reference.learner
     assert policy.card.identity == known({ENV: identify(env)})
-    # The pendulums' were trained when learners acted in N.
+    # Reference policies of pendulums were trained when learners' actions were forces in N.
     in_newtons = "Pendulum" in env_id and "Double" not in env_id
     assert default_learner(env) == ("ppo-pendulum" if in_newtons else reference.learner)
     made = env.make()

@@ -219,7 +219,7 @@ def test_less_than_half_of_the_steps_of_scratch_is_needed(
 
 
 def test_fine_tune_may_be_left_out() -> None:
-    """The first arm that learns is then compared with scratch, and zero-shot without one."""
+    """The first other arm that learns is compared with scratch; without one, zero-shot."""
     found = study_outcome("Ant-to-BigAnt", make_study(arms=("scratch", "zero-shot")))
     assert found.arm == "zero-shot"
     assert found.arm_final == found.zero_shot == pytest.approx(400.0)

@@ -63,7 +63,7 @@ def test_after_100_m_the_whole_robot_is_at_the_same_place(vehicle: str) -> None:
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_sensors_and_reflexes_are_those_of_the_whole_robot(vehicle: str) -> None:
-    """Into walls and back, readings and reasons agree, and the bumper's block is as long."""
+    """While a vehicle drives into walls and back, readings, stops and their durations agree."""
     ways = np.array([(-0.6, 0.8), (0.9, 0.7), (0.3, -0.6)], np.float32)
     drawn = iter(np.repeat(np.tile(ways, (4, 1)), 20, axis=0))
     with closing(VehicleEnv(vehicle, image=False, put_back=True)) as env:

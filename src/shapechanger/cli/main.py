@@ -233,7 +233,7 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
         option = given.replace("_", "-")  # tyro converts names in the same way.
         if option not in options:
             raise UnknownName(f"option of `{said}`", given, sorted(options))
-        # Without a value, one of several values would mean its default.
+        # tyro would use the default for an option of several values that has none.
         if option in named and option not in flags and not equals and value.startswith("--"):
             raise StudyError(f"{given} needs a value after it: see `{said} --help`.")
         if option in seen and get_origin(named.get(option)) is tuple:

@@ -31,11 +31,11 @@ _VERTICAL: Final = 1e-6  # Tolerance of the vertical part of an axis that counts
 _MOST_STEPS: Final = 40  # Largest number of steps to close the loops of a start pose.
 _START_CLOSED: Final = 1e-4  # Largest violation of a start pose, m or rad.
 _SHARES: Final = (0.5, 0.25, 0.125)  # Shares of a drawn deviation, tried until the loops close.
-# If the file's own pose is outside its limits, random deviations from the drawn pose are tried, of
-# this size, rad or m, and this many: steps get stuck at a stretched arm. One in ten tries closes
-# the loop of Metaworld's Sawyer.
-_BEND: Final = 0.6
-_MOST_BENDS: Final = 40
+# If the pose of the file is outside its limits, the steps start from random deviations of the drawn
+# pose, because from a stretched arm they do not close loops. One in ten closes the loop of
+# Metaworld's Sawyer.
+_BEND: Final = 0.6  # Size of a deviation, rad or m.
+_MOST_BENDS: Final = 40  # Largest number of deviations.
 
 
 def robot_bodies(model: mujoco.MjModel) -> NDArray[np.bool_]:

@@ -38,7 +38,8 @@ from shapechanger.robot.twin.start import BoardAt, Place, find_board, start_boar
 _HERE: Final = "127.0.0.1"
 _EVERYWHERE: Final = "0.0.0.0"
 _PILOT: Final = "shapechanger.vehicles.remote.pilot"
-# A twin's clock is paused while it renders, and a guard that waits for it is alive.
+# Longest silence of a twin's guard. The clock of a twin is paused while the twin renders, and a
+# guard that waits for the clock is alive.
 _TWIN_PATIENCE_MS: Final = 10_000
 
 
@@ -147,7 +148,7 @@ class Service:
     def make_known(self, name: str, plan: ServePlan, port: int) -> str:
         """Store a twin as a known robot; return a message about it, or "" if it is not stored.
 
-        It is not stored without TLS, nor with other credentials at any free port.
+        It is not stored without TLS, nor if it has both its own credentials and any free port.
         """
         if self.insecure or (self.credentials is not None and not self.port):
             return ""

@@ -144,6 +144,34 @@ def test_an_unclosed_vector_env_leaves_no_threads() -> None:
     _wait_until(lambda: _ours() == [])
 
 
+def test_an_interruption_waits_for_the_threads() -> None:
+    """After Ctrl-C, the work that has begun is finished before the interruption is raised."""
+    pool, hold, working = EnvThreads(2, 2), threading.Event(), threading.Event()
+    finished: list[int] = []
+
+    def work(number: int) -> None:
+        if number:
+            working.set()
+            hold.wait()
+            finished.append(number)
+
+    def press_and_go_on() -> None:
+        working.wait()
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        threading.Event().wait(0.2)
+        hold.set()
+
+    presser = threading.Thread(target=press_and_go_on)
+    presser.start()
+    with pytest.raises(KeyboardInterrupt):
+        pool.do(work, range(2))
+    presser.join()
+    assert finished == [1]
+    assert not pool.lost
+    pool.stop()
+    _wait_until(lambda: _ours() == [])
+
+
 def test_a_second_interruption_does_not_wait() -> None:
     """A second Ctrl-C abandons a thread that hangs."""
     pool, hold, working = EnvThreads(2, 2), threading.Event(), threading.Event()

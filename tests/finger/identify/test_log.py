@@ -57,7 +57,7 @@ def test_invalid_logs_are_rejected(changes: dict[str, Any], sentence: str) -> No
 
 
 def coupled(own_deg: float) -> FingerLog:
-    """Return the synthetic log, whose last joint moves with another, and by itself this much."""
+    """Return the synthetic log; its last joint follows another, plus `own_deg` of own motion."""
     log = made_up()
     others, fresh = log.angles[:, :3] - log.angles[:, :3].mean(axis=0), log.angles[:, 3]
     fresh = fresh - fresh.mean()
@@ -68,7 +68,7 @@ def coupled(own_deg: float) -> FingerLog:
 
 
 def knuckle(degrees: float) -> FingerLog:
-    """Return the synthetic log, in which the first joint has a range."""
+    """Return the synthetic log, in which the first joint moves over a range of `degrees`."""
     log = made_up()
     low, high = np.percentile(log.angles[:, 0], [5.0, 95.0])
     factor = degrees / math.degrees(high - low)
@@ -85,9 +85,10 @@ def knuckle(degrees: float) -> FingerLog:
     ids=["duration", "range", "independence"],
 )
 def test_limits_of_informative_logs(enough: FingerLog, less: FingerLog, sentence: str) -> None:
-    """A log needs 4 s, to half a period, and a range of 10 degrees per joint.
+    """A log must last 4 s, less half a period, and move each joint over 10 degrees.
 
-    The standard deviation that other joints do not explain must be 2 degrees.
+    The part of a joint's motion that other joints do not explain must have a standard deviation of
+    at least 2 degrees.
     """
     require_informative(enough)
     with pytest.raises(FingerError, match=sentence):

@@ -113,6 +113,11 @@ _REFUSED: list[tuple[mujoco.MjSpec, Edit, str]] = [
         "coupling of 'lower' open by .* no position of its joints within their",
     ),
     (
+        arm(_equal('<connect body1="lower" body2="trunk" anchor="0 0 0"/>')),
+        Stretch("upper", 8.0),
+        "The edits leave the pin or coupling of 'lower' and 'trunk' open by",
+    ),
+    (
         arm(lower=_PLATE),
         Split("lower", "far"),
         "'plate' lies oblique to the plane that would cut it in two: cut 'lower' elsewhere",

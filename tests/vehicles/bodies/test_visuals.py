@@ -1,4 +1,4 @@
-"""Looks of vehicles: they change no physics, and own cameras do not see what is for outside."""
+"""Looks of vehicles: they change no physics."""
 
 import mujoco
 import numpy as np

@@ -144,7 +144,7 @@ def run_as_root(command: RootCommand) -> str:
 
 
 def _root(command: str, *more: object, text: str = "") -> RootCommand:
-    """Return a command of words separated by blanks, more arguments in full, and its input."""
+    """Return a command: the words of `command`, `more` arguments unsplit, and `text` as input."""
     return RootCommand((*command.split(), *map(str, more)), text)
 
 

@@ -208,9 +208,9 @@ class ServoBus:
             RobotError: If there is a fault, or a servo refuses; all torques are then off.
         """
         if self.mode != "off" or self.reason or not self.is_ready:
-            why = "they are already." if self.is_ready else "they are not set up."
+            why = "they are held already." if self.is_ready else "they are not set up."
             device = self._settings.device
-            raise RobotError(f"The servos at {device} are not held: {self.reason or why}")
+            raise RobotError(f"The servos at {device} cannot be held: {self.reason or why}")
         with ExitStack() as undo:
             undo.callback(self.release)
             for one in self.servos.values():
