@@ -135,7 +135,7 @@ def test_a_stop_pulls_no_slack_tendon(ramp_ms: int, pulled: bool) -> None:
 def test_flush_sends_only_while_held() -> None:
     """`flush` writes one packet without reading; the next cycle reports that the bus is gone."""
     rig = Rig()
-    with pytest.raises(RobotError, match="not held: they are not set up"):
+    with pytest.raises(RobotError, match="cannot be held: they are not set up"):
         rig.bus.hold()
     rig.bus.set_up()
     rig.port.sent.clear()

@@ -60,7 +60,7 @@ def test_a_fault_of_one_servo_stops_all(family: str, fault: _Fault, text: str) -
     assert rig.faulty == ["EIP"]
     assert reason.startswith("Servo EIP (id 3) ")
     assert text in reason
-    with pytest.raises(RobotError, match=r"not held: Servo EIP \(id 3\)"):
+    with pytest.raises(RobotError, match=r"cannot be held: Servo EIP \(id 3\)"):
         rig.bus.hold()
     rig.run(None)
     # The faulty servo has released; the others have begun to ramp down.
