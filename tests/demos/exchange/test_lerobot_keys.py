@@ -282,3 +282,13 @@ def test_rows_are_found_in_a_file_that_is_not_named(tmp_path: Path) -> None:
         pairs, context = pairs_of(folder)
         assert pairs == BOTH
         assert not context.findings
+
+
+def test_the_rest_of_a_dataset_with_a_damaged_file_is_imported(tmp_path: Path) -> None:
+    folder = write_set(tmp_path / "set")
+    damaged = (folder / DATA).with_name("file-001.parquet")
+    damaged.write_bytes(b"PAR1")
+    pairs, context = pairs_of(folder)
+    assert pairs == BOTH
+    assert findings_of(context).startswith("left out: ")
+    assert damaged.name in findings_of(context)

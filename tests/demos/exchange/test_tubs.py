@@ -162,6 +162,12 @@ def in_manifest(old: str, new: str) -> Callable[[Path], object]:
             "record 0, record 1, record 4: the image of several records",
             {0, 1, 4},
         ),
+        (
+            lambda f: (f / "catalog_1.catalog").unlink(),
+            "catalog_1.catalog: There is no",
+            {6, 7, 8, 9},
+        ),
+        (in_manifest("catalog_1", "../catalog_1"), "leaves the folder", {6, 7, 8, 9}),
     ],
 )
 def test_the_rest_of_a_damaged_tub_is_imported(
@@ -201,22 +207,6 @@ def test_pictures_of_other_records(tmp_path: Path) -> None:
         (folder / f"images/{n}_cam_image_array_.jpg").write_bytes(picture(n))
     _, done = imported(folder)
     assert "... (6 in all): the image of another number" in findings_of(done)
-
-
-@pytest.mark.parametrize(
-    ("spoil", "message"),
-    [
-        (lambda f: (f / "catalog_1.catalog").unlink(), "There is no .*catalog_1.catalog"),
-        (in_manifest("catalog_1", "../catalog_1"), "leaves the folder"),
-    ],
-)
-def test_a_tub_without_a_catalog(
-    tmp_path: Path, spoil: Callable[[Path], object], message: str
-) -> None:
-    folder = tub_folder(tmp_path / "tub", records(10), per_catalog=6)
-    spoil(folder)
-    with pytest.raises(DemosError, match=message):
-        imported(folder)
 
 
 @pytest.mark.parametrize("lines", [0, 4])

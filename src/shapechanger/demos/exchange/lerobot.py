@@ -140,7 +140,7 @@ class _Dataset:
         self._entries = self._read_entries()
         self._most_bytes = files.MAX_UNPACKED  # Limit on all images in the tables together.
         self._rows = self._find_rows()
-        self._videos: dict[str, VideoTimes] = {}
+        self._videos: dict[str, VideoTimes | DemosError] = {}
 
     def read(self) -> Iterator[base.ExchangeEpisode]:
         """Yield the episodes; iterating the records of one with contradictions raises an error."""
@@ -198,11 +198,15 @@ class _Dataset:
         found, columns = defaultdict[float, list[Path]](list), set[str]()
         pattern = _PLACE.sub("*", glob.escape(self._info.data_path))
         for name in sorted(glob.glob(pattern, root_dir=self._folder)):
-            path = files.inside(self._folder, name, INFO)
-            batches = (_vectors(batch, _KEYS[0], 1) for batch in _batches(path, _KEYS[:1]))
+            try:
+                path = files.inside(self._folder, name, INFO)
+                batches = [_vectors(batch, _KEYS[0], 1) for batch in _batches(path, _KEYS[:1])]
+                columns |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
+            except DemosError as error:
+                self._context.report("left out", str(error).removesuffix("."), name)
+                continue
             for number in {number for batch in batches for number in np.unique(batch).tolist()}:
                 found[number].append(path)
-            columns |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
             self._most_bytes += _MAX_PACKED * path.stat().st_size
         for column in sorted(columns - self._info.features.keys()):
             if not column.startswith("__index_level_"):  # Index columns of pandas.
@@ -223,8 +227,18 @@ class _Dataset:
 
     def _times(self, name: str) -> VideoTimes:
         """Return the times of a video; refuse a video that does not fit its episodes."""
-        if name in self._videos:
-            return self._videos[name]
+        if name not in self._videos:
+            try:
+                self._videos[name] = self._checked_times(name)
+            except DemosError as error:  # The next episode of this video is refused at once.
+                self._videos[name] = error
+        times = self._videos[name]
+        if isinstance(times, DemosError):
+            raise times
+        return times
+
+    def _checked_times(self, name: str) -> VideoTimes:
+        """Read the times of a video, and compare them with those of its episodes."""
         times = read_times(files.inside(self._folder, name, self._folder / EPISODES))
         if times.size != self._size:
             raise DemosError(f"{name} has images of {times.size} pixels, not {self._size}.")
@@ -245,7 +259,6 @@ class _Dataset:
             self._context.report("warning", f"There are more images: {about}.")
         if (np.diff(spans_s.ravel()) < -half_s).any():
             raise DemosError(f"Parts of {name} overlap, or end before they begin.")
-        self._videos[name] = times
         return times
 
     def _filmed(self, entry: _Entry) -> Iterator[NDArray[np.uint8]]:

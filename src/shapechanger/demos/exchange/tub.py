@@ -130,7 +130,11 @@ def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
         raise DemosError(f"{path} names a catalog twice in its paths.")
     found: dict[int, list[Fields]] = {}
     for name in catalogs.paths:
-        text = files.read_bytes(files.inside(folder, name, path))
+        try:
+            text = files.read_bytes(files.inside(folder, name, path))
+        except DemosError as error:
+            context.report("left out", str(error).removesuffix("."), name)
+            continue
         for number, line in enumerate(text.split(b"\n"), 1):
             try:
                 if line.strip():
