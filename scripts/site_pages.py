@@ -7,7 +7,7 @@ import inspect
 import logging
 import os
 from functools import cache
-from itertools import groupby, takewhile
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -16,7 +16,7 @@ import imageio.v3 as iio
 
 import shapechanger
 from scripts.wiring_diagrams import draw_wiring, part_list, pin_table, table
-from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     NAMESPACE,
@@ -26,7 +26,6 @@ from shapechanger.envs.catalogue import (
     summaries,
 )
 from shapechanger.errors import RenderError
-from shapechanger.layout import Feature, Layout
 from shapechanger.robot.profile import load_profile, shipped_profiles
 
 Pages = dict[str, str | bytes]
@@ -91,12 +90,10 @@ def _environment(env_id: str) -> tuple[str, bytes | None]:
         RenderError: If nothing renders on CI, where nothing may be missing.
     """
     short, spec, picture = _short(env_id), gym.registry[env_id], None
-    numbers = ""
     module, _, name = cast("str", spec.entry_point).partition(":")
     # The others need a robot or a file.
     if not short.startswith("Remote") and env_id != OWN_ROBOT:
         with EnvRef(env_id).make() as env:
-            numbers = _numbers(env)
             try:
                 if hasattr(env.unwrapped, "picture"):
                     env.reset(seed=0)
@@ -124,49 +121,8 @@ def _environment(env_id: str) -> tuple[str, bytes | None]:
         f"![{short} at the start of an episode]({short}.jpg)" if picture else "",
         table(("property", "value"), [row for row in facts.items() if row[1]]),
         _described(f"{module}.{name}", "members: []", "show_bases: false", "heading_level: 1"),
-        numbers,
     )
     return content, picture
-
-
-def _numbers(env: gym.Env[Any, Any]) -> str:
-    """Return the tables of both spaces of an env whose docstring describes another body."""
-    described = inspect.getdoc(type(env.unwrapped)) or ""
-    observation, action = layouts_of(env)
-    last = layout_rows(observation, "Observation")[-1][0] if observation else ""
-    if "| Num" in described and (f"| {last} " in described or len(observation or ()) == 1):
-        return ""
-    sections: list[str] = []
-    for layout, title in ((observation, "Observation"), (action, "Action")):
-        if layout is not None:
-            rows = layout_rows(layout, title)
-            sections += [f"## {title}s", table(("Num", title, "Min", "Max", "Unit"), rows)]
-    return _page(*sections)
-
-
-def layout_rows(layout: Layout, title: str) -> list[tuple[str, ...]]:
-    """Return a row per number; three observations of one kind or more share one."""
-    rows: list[tuple[str, ...]] = []
-    first = 0
-    for (kind, low, high, _), group in groupby(layout, _kind_of):
-        features = list(group)
-        is_block = title == "Observation" and len(features) > 2
-        for few in [features] if is_block else [[feature] for feature in features]:
-            size = sum(feature.size for feature in few)
-            place = str(first) if size == 1 else f"{first}-{first + size - 1}"
-            suffix = "/*" if few[0].name.count("/") > 1 else ""
-            name = f"`*/{kind}{suffix}`" if is_block else f"`{few[0].name}`"
-            rows.append((place, name, low, high, ", ".join(dict.fromkeys(f.unit for f in few))))
-            first += size
-    return rows
-
-
-def _kind_of(feature: Feature) -> tuple[str, str, str, str]:
-    """Return the name without the element, the bounds and the unit; the units of a block differ."""
-    _, _, kind = feature.name.partition("/")
-    kind, _, part = kind.partition("/")
-    unit = "" if part else feature.unit
-    return kind or feature.name, f"{feature.low:.4g}", f"{feature.high:.4g}", unit
 
 
 def _described(path: str, *options: str) -> str:

@@ -398,3 +398,80 @@ def is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
     Its height is from low to high, m, and its up axis above the horizon.
     """
     return (low <= z) & (z <= high) & (1.0 - 2.0 * (x * x + y * y) > 0.0)
+
+
+class ExtendedAntEnv(AntEnv):
+    """Run forwards on four legs of three segments, which make both spaces larger than the ant's.
+
+    ## Action space
+    `Box(-1, 1, (12,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
+    lasts 0.05 s.
+
+    | Num | Action          | Min | Max | Unit |
+    | --- | --------------- | --- | --- | ---- |
+    | 0   | `hip_4/motor`   | -1  | 1   | 1    |
+    | 1   | `ankle_4/motor` | -1  | 1   | 1    |
+    | 2   | `hip_1/motor`   | -1  | 1   | 1    |
+    | 3   | `ankle_1/motor` | -1  | 1   | 1    |
+    | 4   | `hip_2/motor`   | -1  | 1   | 1    |
+    | 5   | `ankle_2/motor` | -1  | 1   | 1    |
+    | 6   | `hip_3/motor`   | -1  | 1   | 1    |
+    | 7   | `ankle_3/motor` | -1  | 1   | 1    |
+    | 8   | `foot_4/motor`  | -1  | 1   | 1    |
+    | 9   | `foot_1/motor`  | -1  | 1   | 1    |
+    | 10  | `foot_2/motor`  | -1  | 1   | 1    |
+    | 11  | `foot_3/motor`  | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (137,), float64)`, for the unedited body:
+
+    | Num    | Observation     | Min     | Max     | Unit   |
+    | ------ | --------------- | ------- | ------- | ------ |
+    | 0      | `torso/z`       | -inf    | inf     | m      |
+    | 1      | `torso/qw`      | -1      | 1       | 1      |
+    | 2      | `torso/qx`      | -1      | 1       | 1      |
+    | 3      | `torso/qy`      | -1      | 1       | 1      |
+    | 4      | `torso/qz`      | -1      | 1       | 1      |
+    | 5      | `hip_1/angle`   | -0.5236 | 0.5236  | rad    |
+    | 6      | `ankle_1/angle` | 0.5236  | 0.8727  | rad    |
+    | 7      | `foot_1/angle`  | 0.5236  | 1.222   | rad    |
+    | 8      | `hip_2/angle`   | -0.5236 | 0.5236  | rad    |
+    | 9      | `ankle_2/angle` | -0.8727 | -0.5236 | rad    |
+    | 10     | `foot_2/angle`  | -1.222  | -0.5236 | rad    |
+    | 11     | `hip_3/angle`   | -0.5236 | 0.5236  | rad    |
+    | 12     | `ankle_3/angle` | -0.8727 | -0.5236 | rad    |
+    | 13     | `foot_3/angle`  | -1.222  | -0.5236 | rad    |
+    | 14     | `hip_4/angle`   | -0.5236 | 0.5236  | rad    |
+    | 15     | `ankle_4/angle` | 0.5236  | 0.8727  | rad    |
+    | 16     | `foot_4/angle`  | 0.5236  | 1.222   | rad    |
+    | 17     | `torso/vx`      | -inf    | inf     | m/s    |
+    | 18     | `torso/vy`      | -inf    | inf     | m/s    |
+    | 19     | `torso/vz`      | -inf    | inf     | m/s    |
+    | 20     | `torso/wx`      | -inf    | inf     | rad/s  |
+    | 21     | `torso/wy`      | -inf    | inf     | rad/s  |
+    | 22     | `torso/wz`      | -inf    | inf     | rad/s  |
+    | 23-34  | `*/velocity`    | -inf    | inf     | rad/s  |
+    | 35-136 | `*/contact/*`   | -1      | 1       | N·m, N |
+
+    ## Reward
+    As for `AntEnv`.
+
+    ## Start
+    As for `AntEnv`.
+
+    ## End
+    As for `AntEnv`.
+
+    ## Info
+    As for `AntEnv`.
+
+    ## Versions
+    v1: the first.
+
+    Args:
+        body: As for `AntEnv`, such as "ExtendedAntPassive", whose third segments have no motors.
+        **arguments: All other arguments of `AntEnv`.
+    """
+
+    def __init__(self, body: BodyLike = "ExtendedAnt", **arguments: Any) -> None:
+        super().__init__(body, **arguments)

@@ -124,6 +124,8 @@ _BODIES: Final = (
 
 def _entry(name: str, family: str, summary: str) -> CatalogueEntry:
     entry_point, learner, threshold = _FAMILIES[family]
+    if name == "ExtendedAnt":  # Its spaces are larger, so its class has a page of its own.
+        entry_point = "ant:ExtendedAntEnv"
     place = f"shapechanger.envs.{entry_point}"
     return CatalogueEntry(name, family, summary, place, learner, threshold)
 

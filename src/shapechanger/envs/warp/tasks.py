@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from typing_extensions import override
 
-from shapechanger.envs.ant import AntEnv, is_upright
+from shapechanger.envs.ant import AntEnv, ExtendedAntEnv, is_upright
 from shapechanger.envs.pendulum import (
     CLIPPED_AT,
     FALLEN_M,
@@ -377,6 +377,7 @@ class DeviceHumanoid(DeviceRunner):
 
 TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
     AntEnv: DeviceAnt,
+    ExtendedAntEnv: DeviceAnt,
     InvertedPendulumEnv: DevicePendulum,
     InvertedDoublePendulumEnv: DeviceDoublePendulum,
     HalfCheetahEnv: DeviceCheetah,
