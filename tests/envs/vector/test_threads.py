@@ -165,8 +165,8 @@ def test_an_interruption_waits_for_the_threads() -> None:
     presser.start()
     with pytest.raises(KeyboardInterrupt):
         pool.do(work, range(2))
-    presser.join()
     assert finished == [1]
+    presser.join()
     assert not pool.lost
     pool.stop()
     _wait_until(lambda: _ours() == [])
