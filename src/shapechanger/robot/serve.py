@@ -148,7 +148,8 @@ class Service:
     def make_known(self, name: str, plan: ServePlan, port: int) -> str:
         """Store a twin as a known robot; return a message about it, or "" if it is not stored.
 
-        It is not stored without TLS, nor if it has both its own credentials and any free port.
+        A twin without TLS is not stored, nor one with other credentials at a port that the system
+        chose.
         """
         if self.insecure or (self.credentials is not None and not self.port):
             return ""
