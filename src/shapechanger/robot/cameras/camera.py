@@ -46,15 +46,11 @@ class _PathKeys(Keys, frozen=True, kw_only=True):
 
 
 class CameraKind(NamedTuple):
-    """A kind of camera.
+    """A kind of camera."""
 
-    Attributes:
-        keys: Keys of its settings in a profile, in addition to the keys that all cameras have.
-        opens: MODULE:NAME of its driver, which is called with the camera's plan.
-    """
-
+    # Keys of its settings in a profile, in addition to the keys that all cameras have.
     keys: type[Keys]
-    opens: str
+    opens: str  # MODULE:NAME of its driver, which is called with the camera's plan.
 
 
 CAMERAS: Final = {
@@ -69,19 +65,14 @@ CAMERAS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame.
+    """One frame."""
 
-    Attributes:
-        jpeg: The image as JPEG.
-        captured_ns: Time of capture on the robot's monotonic clock, ns.
-        encoded_here: Whether this process has encoded the JPEG from an image of the right size, so
-            that the frame needs no further check.
-        skipped: Number of bytes between the previous frame and this one that belong to no frame.
-    """
-
-    jpeg: bytes
-    captured_ns: int
+    jpeg: bytes  # The image as JPEG.
+    captured_ns: int  # Time of capture on the robot's monotonic clock, ns.
+    # Whether this process has encoded the JPEG from an image of the right size, so that the frame
+    # needs no further check.
     encoded_here: bool = False
+    # Number of bytes between the previous frame and this one that belong to no frame.
     skipped: int = 0
 
 
@@ -118,11 +109,7 @@ class CameraPlan:
 
 
 class Camera:
-    """Source of frames. One thread may call `read`; any thread may call `close`, which ends waits.
-
-    Args:
-        plan: The camera.
-    """
+    """Source of frames. One thread may call `read`; any thread may `close`, which ends waits."""
 
     def __init__(self, plan: CameraPlan) -> None:
         self.plan = plan
@@ -131,19 +118,11 @@ class Camera:
         self._next_ns = time.monotonic_ns()
 
     def read(self) -> Frame:
-        """Wait for the next frame.
-
-        Raises:
-            RobotError: If the camera stopped or its data is not a valid frame.
-        """
+        """Wait for the next frame; raise RobotError if the camera stops or its data is invalid."""
         raise NotImplementedError
 
     def wait(self, fd: int | None = None, at_most_s: float | None = None) -> bool:
-        """Wait until a descriptor is readable.
-
-        Returns:
-            Whether the descriptor is readable; False after `at_most_s` seconds.
-        """
+        """Return True once a descriptor is readable, or False after `at_most_s` seconds."""
         poll = select.poll()
         for one in (self._woken,) if fd is None else (self._woken, fd):
             poll.register(one, select.POLLIN)

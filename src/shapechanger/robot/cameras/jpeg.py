@@ -86,13 +86,10 @@ class JpegSplitter:
     A frame is parsed from marker to marker, so that a thumbnail in it, or a marker in a comment,
     does not end it. Bytes outside complete frames are skipped, such as the headers between the
     parts of an HTTP stream, padding, and incomplete frames.
-
-    Attributes:
-        skipped: Number of bytes skipped so far.
     """
 
     def __init__(self) -> None:
-        self.skipped = 0
+        self.skipped = 0  # Number of bytes skipped so far.
         self._data = bytearray()
         self._since_frame = 0  # Bytes skipped since the last frame.
 
@@ -103,11 +100,14 @@ class JpegSplitter:
     def next(self) -> bytes | None:
         """Return the next complete frame, or None if more bytes are needed.
 
-        Raises:
-            RobotError: If there is more than 1 MiB without a frame; the next call continues after
-                it.
+        More than 1 MiB without a frame raises RobotError; the next call continues after it.
         """
-        while (length := self._length_of_first()) is not None:
+        while True:
+            start = self._data.find(_START)
+            # Without a start marker, the last byte may be the first byte of one.
+            self._skip(start if start >= 0 else len(self._data) - self._data.endswith(b"\xff"))
+            if (length := _length(self._data)) is None:
+                break
             jpeg = bytes(self._data[: max(length, 0)])
             if skipped := max(-length, 0) or _start_of_another(jpeg):
                 self._skip(skipped)
@@ -124,13 +124,6 @@ class JpegSplitter:
                 f"{_MAX_JPEG} bytes: send MJPEG."
             )
         return None
-
-    def _length_of_first(self) -> int | None:
-        """Skip the bytes before the first frame; see `_length` for the result."""
-        start = self._data.find(_START)
-        # Without a start marker, the last byte may be the first byte of one.
-        self._skip(start if start >= 0 else len(self._data) - self._data.endswith(b"\xff"))
-        return _length(self._data)
 
     def _skip(self, count: int) -> None:
         self.skipped += count

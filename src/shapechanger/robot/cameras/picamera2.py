@@ -19,17 +19,18 @@ _SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
 # The bytes of a pixel in "BGR888" are red, green, blue: the name has the order in a word.
 _FORMAT: Final = "BGR888"
 
+_NOT_INSTALLED: Final = (
+    "The Pi's camera needs picamera2: `sudo apt install python3-picamera2`, and a virtual "
+    "environment made with `python3 -m venv --system-site-packages` by the system's Python."
+)
+
 
 class PiCamera(Camera):
-    """Camera on the Pi's own connector; see `Camera`. Its setting is its `number`, from 0.
-
-    Raises:
-        RobotError: If picamera2 is not installed, or the system has no camera with this number.
-    """
+    """Camera on the Pi's own connector; see `Camera`. Its setting is its `number`, from 0."""
 
     def __init__(self, plan: CameraPlan) -> None:
         super().__init__(plan)
-        with translate_errors(ImportError, to=_not_installed):
+        with translate_errors(ImportError, to=lambda _: RobotError(_NOT_INSTALLED)):
             from libcamera import Transform  # pyright: ignore[reportMissingModuleSource]
             from picamera2 import Picamera2  # pyright: ignore[reportMissingModuleSource]
         self._lock = threading.Lock()  # `close` waits for a `read` in progress.
@@ -85,11 +86,3 @@ class PiCamera(Camera):
                 super().close()
                 self._camera.stop()
                 self._camera.close()
-
-
-def _not_installed(_: ImportError) -> RobotError:
-    return RobotError(
-        "The Pi's camera needs picamera2: `sudo apt install python3-picamera2`, and a "
-        "virtual environment made with `python3 -m venv --system-site-packages` by the "
-        "system's Python."
-    )

@@ -125,10 +125,7 @@ class Pipe(Camera):
 
 
 class Folder(Camera):
-    """Camera that replays the files of a folder in the order of their names; see `Camera`.
-
-    Its setting is the folder, `path`.
-    """
+    """Camera that replays the files of the folder `path` in the order of their names."""
 
     def __init__(self, plan: CameraPlan) -> None:
         super().__init__(plan)
@@ -168,11 +165,9 @@ def barcode_rows(width: int) -> int:
 
 
 def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
-    """Draw the lowest 48 bits of a number over the first rows of an image.
+    """Draw the lowest 48 bits of a number over the first rows of an image, in place.
 
-    Args:
-        image: The image, shape (height, width, 3), at least 96 pixels wide; changed in place.
-        number: The number.
+    The image has the shape (height, width, 3) and is at least 96 pixels wide.
     """
     height, width = image.shape[:2]
     rows = barcode_rows(width)
@@ -190,10 +185,7 @@ def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
 
 
 class Pattern(Camera):
-    """Camera with drifting colours and the time of capture as a barcode; see `Camera`.
-
-    It has no settings and ignores `flip`.
-    """
+    """Camera with drifting colours and the time of capture as a barcode; it ignores `flip`."""
 
     def __init__(self, plan: CameraPlan) -> None:
         super().__init__(plan)

@@ -78,9 +78,7 @@ class BufferRequest(ctypes.Structure):
 class V4l2(Camera):
     """Webcam; see `Camera`. If several frames are ready, the newest is returned.
 
-    Args:
-        plan: The camera; its setting is the `device`, such as /dev/video0.
-        ioctl: Function that calls the kernel, like `fcntl.ioctl`.
+    `ioctl` is a function that calls the kernel, like `fcntl.ioctl`.
     """
 
     def __init__(

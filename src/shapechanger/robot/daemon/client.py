@@ -1,4 +1,4 @@
-"""A client of the robot: its identity and its queue of messages."""
+"""Clients of the robot."""
 
 from __future__ import annotations
 
@@ -32,23 +32,15 @@ class Client:
 
     The queue is for messages other than observations. It keeps the newest lease, the newest
     recorder state and the newest 32 events; others are accepted while fewer than 256 are queued.
-
-    Attributes:
-        session: Number of the connection.
-        name: Display name; empty before its hello.
-        role: "person" or "program".
-        posted: Set when a message waits.
-        updated: Set when an observation may be due.
-        expelled: Reason why the connection must end, a sentence; "" if it may continue.
     """
 
     def __init__(self, session: int, name: str = "", role: messages.Role = "program") -> None:
-        self.session = session
-        self.name = name
+        self.session = session  # Number of the connection.
+        self.name = name  # Display name; empty before its hello.
         self.role: messages.Role = role
-        self.posted = asyncio.Event()
-        self.updated = asyncio.Event()
-        self.expelled = ""
+        self.posted = asyncio.Event()  # Set when a message waits.
+        self.updated = asyncio.Event()  # Set when an observation may be due.
+        self.expelled = ""  # Sentence on why the connection must end; "" if it may continue.
         self._messages: deque[messages.RobotMessage] = deque()
 
     @property

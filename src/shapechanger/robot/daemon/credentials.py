@@ -27,17 +27,12 @@ _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """Key and certificate that identify a robot to its clients.
+    """Key and certificate that identify a robot to its clients."""
 
-    Attributes:
-        folder: Folder of the files of key and certificate.
-        key: Key that clients must prove to have, as letters and digits.
-        fingerprint: SHA-256 of the certificate (DER).
-    """
-
-    folder: Path
-    key: str = field(repr=False)  # Keep the key out of logs.
-    fingerprint: bytes
+    folder: Path  # Folder of the files of key and certificate.
+    # Key that clients must prove to have, as letters and digits; kept out of logs.
+    key: str = field(repr=False)
+    fingerprint: bytes  # SHA-256 of the certificate (DER).
 
     def tls(self) -> ssl.SSLContext:
         """Return the server's context for TLS 1.3 or newer."""
@@ -52,15 +47,11 @@ class Credentials:
 
 @dataclass(frozen=True, slots=True)
 class Authenticator:
-    """Checks that a client holds the robot's key.
+    """Checks that a client holds the robot's key."""
 
-    Attributes:
-        key: The key; empty to accept every client.
-        certificate: Fingerprint of the certificate; empty without TLS.
-    """
-
-    key: bytes = field(default=b"", repr=False)  # Keep the key out of logs.
-    certificate: bytes = b""
+    # The key, kept out of logs; empty to accept every client.
+    key: bytes = field(default=b"", repr=False)
+    certificate: bytes = b""  # Fingerprint of the certificate; empty without TLS.
 
     @property
     def is_open(self) -> bool:

@@ -24,12 +24,8 @@ from shapechanger.robot.guard.channel import NO_STATE, GuardState, Order
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.link import messages
 
-_MAX_CLIENTS: Final = 8
-"""Most clients connected at the same time."""
-
-_MAX_PROGRAMS: Final = 6
-"""Most programs among these clients, so that two people can connect without displacing any."""
-
+_MAX_CLIENTS: Final = 8  # Most clients connected at the same time.
+_MAX_PROGRAMS: Final = 6  # Most programs, so that two people can connect without displacing any.
 _NS_PER_MS: Final = 1_000_000
 _ARRIVALS: Final = 64  # Arrival times to store; more than commands can be pending.
 _APPLIED: Final = "/applied"
@@ -51,23 +47,7 @@ _NOTHING: Final = PendingCommand(Client(0), (), 0)
 
 
 class SessionHub:
-    """State of the robot that its connections share. Its methods never block or use sockets.
-
-    Attributes:
-        plan: Description of the robot.
-        now_ns: Returns the robot's time, ns.
-        in_steps: True if time stands still between calls of `step`.
-        holder: The client in control, which holds the lease; or None.
-        lease: Number of the current lease, or of the last one. Each lease has a larger number than
-            the one before, so that commands of an earlier lease can be recognised.
-        recorder: Records episodes.
-        library: Reads recorded episodes.
-        policies: Runs policies on board.
-        action_size: Number of values of a command.
-        state: Newest state of the guard.
-        frame: Newest frame, or None.
-        frame_seq: Number of the newest frame, from 1; 0 before the first frame.
-    """
+    """State of the robot that its connections share. Its methods never block or use sockets."""
 
     def __init__(
         self,
@@ -79,18 +59,20 @@ class SessionHub:
     ) -> None:
         self.plan = plan
         self.now_ns = clock.now_ns
-        self.in_steps = plan.card.clock == "twin"
-        self.holder: Client | None = None
+        self.in_steps = plan.card.clock == "twin"  # Whether time only passes in calls of `step`.
+        self.holder: Client | None = None  # The client in control, which holds the lease.
+        # Number of the newest lease. Each lease has a larger number than the one before, so that
+        # commands of an earlier lease can be recognised.
         self.lease = 0
         actions = Layout.from_json(plan.card.action_layout)
-        self.action_size = actions.size
+        self.action_size = actions.size  # Number of values of a command.
         self._applied = [f"{name}{_APPLIED}" for name in actions.names]
         features = Layout.from_json(plan.card.state_layout).features
         self._names = [f.name for f in features for _ in range(f.size)]
         self._absent = {f.name: _ABSENT for f in features if not f.name.endswith(_APPLIED)}
-        self.state = NO_STATE
-        self.frame: Frame | None = None
-        self.frame_seq = 0
+        self.state = NO_STATE  # Newest state of the guard.
+        self.frame: Frame | None = None  # Newest frame.
+        self.frame_seq = 0  # Number of the newest frame, from 1; 0 before the first frame.
         self._clock = clock
         self._order = order
         self._drain = drain

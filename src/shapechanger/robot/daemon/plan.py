@@ -13,32 +13,18 @@ from shapechanger.robot.link.card import RobotCard
 
 
 class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Settings of the daemon. They are checked when the fields of a `ServePlan` are converted.
-
-    Attributes:
-        card: Facts of the robot.
-        camera: Settings of the camera; None without a camera.
-        host: Address to listen at.
-        port: Port to listen at; 0 for any free port.
-        credentials: Folder of the robot's key and certificate; "" for none, and no TLS.
-        insecure: Whether to serve without TLS, also to other machines.
-        discovery: Whether to announce the robot on the local network.
-        ready_file: File that the port is written to; "" for none.
-        recordings: Folder of the recorded episodes; "" for none.
-        policies: Folder of the policies that may run on the robot's computer; "" for none.
-        policy: Name of the policy that starts with the robot; "" for none.
-        pilot: Module of the program that runs a policy; "" for none.
-    """
+    """Settings of the daemon. They are checked when the fields of a `ServePlan` are converted."""
 
     card: RobotCard
     camera: CameraPlan | None = None
-    host: str = "127.0.0.1"
+    host: str = "127.0.0.1"  # Address to listen at.
+    # Port to listen at; 0 for any free port.
     port: Annotated[int, Meta(ge=0, le=65535)] = DEFAULT_PORT
-    credentials: str = ""
-    insecure: bool = False
-    discovery: bool = True
-    ready_file: str = ""
-    recordings: str = ""
-    policies: str = ""
-    policy: str = ""
-    pilot: str = ""
+    credentials: str = ""  # Folder of the robot's key and certificate; "" for none, and no TLS.
+    insecure: bool = False  # Whether to serve without TLS, also to other machines.
+    discovery: bool = True  # Whether to announce the robot on the local network.
+    ready_file: str = ""  # File that the port is written to; "" for none.
+    recordings: str = ""  # Folder of the recorded episodes; "" for none.
+    policies: str = ""  # Folder of the policies that may run on the robot's computer; "" for none.
+    policy: str = ""  # Name of the policy that starts with the robot; "" for none.
+    pilot: str = ""  # Module of the program that runs a policy; "" for none.

@@ -151,11 +151,7 @@ class Daemon:
         self._heartbeat_fd = heartbeat_fd
 
     async def run(self) -> str:
-        """Serve until `end` is called.
-
-        Returns:
-            The reason of an unexpected end; "" after a request to end.
-        """
+        """Serve until `end`; return why it ended unexpectedly, or "" after a request to end."""
         hub, plan = self._hub, self._hub.plan
         credentials.check_exposure(plan)
         key, tls, fingerprint = "", None, b""

@@ -133,9 +133,6 @@ class Recorder:
     next observation of the same client completes it, because it reports the applied outputs. If two
     commands answer the same observation, the later one counts. A command that answers an older
     observation than the last step is ignored, so that time never runs backwards in an episode.
-
-    Attributes:
-        on: Whether an episode is recorded.
     """
 
     def __init__(
@@ -144,7 +141,7 @@ class Recorder:
         broadcast: Callable[[messages.RobotMessage], None],
         call: Callable[[Callable[[], None]], None],
     ) -> None:
-        self.on = False
+        self.on = False  # Whether an episode is recorded.
         self._plan = plan
         self._broadcast = broadcast
         features = Layout.from_json(plan.card.action_layout).features

@@ -197,10 +197,8 @@ _HEADERS: Final = {
     "X-Frame-Options": "DENY",
 }
 
-
 ENTRY: Final = "index.html"
 """Page of the console, on which a person drives and records."""
-
 _FOLDER: Final = Path(__file__).parents[1] / "console"
 # Media types to serve; other files in the folder are not served.
 _KINDS: Final = {
@@ -212,11 +210,7 @@ _KINDS: Final = {
 
 
 def console_files(folder: Path = _FOLDER) -> dict[str, tuple[str, bytes]]:
-    """Return the media type and the content (UTF-8) of each file of the console.
-
-    Raises:
-        RobotError: If a file cannot be read, for example after a failed installation.
-    """
+    """Return the media type and the content (UTF-8) of each file of the console."""
     failed = f"Cannot read the console in {folder}"
     with translate_errors(OSError, to=lambda error: RobotError(f"{failed}: {error}.")):
         files = {

@@ -50,7 +50,6 @@ _WRONG_KEY_S: Final = 0.5
 # observation without it would use up the client's credit.
 _FRAME_PACE: Final = 1.25
 
-
 _BY_PERSONS: Final = (messages.Record, messages.Mark, messages.Undo, messages.Judge)
 _OF_RECORDINGS: Final = (*_BY_PERSONS, messages.Browse, messages.Fetch)
 
@@ -65,9 +64,6 @@ class Session:
 
     `introduce`, `receive` and `observe` are the rules, without sockets; `run` serves the client on
     a WebSocket: it receives, answers, and sends observations when they are due.
-
-    Attributes:
-        client: Identity of the client, and the messages for it other than observations.
     """
 
     def __init__(

@@ -101,11 +101,7 @@ Magnet = Literal["", "gone", "weak", "strong"]
 
 
 class As5600(I2cDevice):
-    """Encoders of several joints, behind the multiplexer; see `SensorDriver`.
-
-    Attributes:
-        joints: Keys of each joint, keyed by name.
-    """
+    """Encoders of several joints, behind the multiplexer; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         keys = As5600Keys.of(plan.settings)
@@ -137,10 +133,7 @@ class As5600(I2cDevice):
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return each joint's angle, such as `MCP_flexion/angle`, rad, -pi to pi around its zero.
 
-        Joints without a reading are omitted.
-
-        Raises:
-            RobotError: If a joint was missing in several consecutive readings.
+        Joints without a reading are omitted. Several missing readings in a row raise RobotError.
         """
         said: dict[str, float] = {}
         failures: dict[str, None] = {}  # A missing multiplexer is reported once.

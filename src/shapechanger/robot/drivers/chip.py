@@ -148,8 +148,7 @@ def _kinds() -> tuple[type[BaseException], ...]:
 class I2cDevice:
     """Base class of the drivers of chips on an I2C bus, whose errors name the chip.
 
-    Attributes:
-        name: The name, such as "Sensor 'imu'", with the address, for messages.
+    The `name`, such as "Sensor 'imu'", gets the address appended for messages.
     """
 
     def __init__(self, name: str, keys: I2cKeys, hardware: Hardware) -> None:
@@ -345,9 +344,7 @@ def _others() -> dict[str, SensorChip | OutputChip | PulseSource]:
 class Chips(Mapping[str, _Chip]):
     """Chips of one kind, keyed by driver and loaded on demand, because a guard needs only few.
 
-    Args:
-        kind: Class of the chips.
-        **own: MODULE:NAME of each chip in this folder; other packages cannot replace these.
+    `own` has MODULE:NAME of each chip in this folder; other packages cannot replace these.
     """
 
     def __init__(self, kind: type[_Chip], **own: str) -> None:

@@ -67,8 +67,7 @@ class Hcsr04:
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the "distance" in m, at most `max_m`; empty before the first echo.
 
-        Raises:
-            RobotError: If three consecutive pings had no echo, so that the last distance is old.
+        RobotError is raised after three pings without an echo: the last distance is then old.
         """
         if self._pinged_ns is None or now_ns - self._pinged_ns >= _CYCLE_NS:
             self._pinged_ns = now_ns
@@ -113,19 +112,14 @@ _FARTHEST_M: Final = 4.0
 
 
 class SimulatedHcsr04(SimulatedSensor):
-    """An HC-SR04, which answers a ping at the falling edge of its trigger.
-
-    Attributes:
-        override_m: Distance to measure, m; None for the true distance.
-        dead: Whether it does not answer at all.
-    """
+    """An HC-SR04, which answers a ping at the falling edge of its trigger."""
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
         self._keys = keys = Hcsr04Keys.of(plan.settings)
         self._world = world
         self._busy_until_ns = 0
-        self.override_m: float | None = None
-        self.dead = False
+        self.override_m: float | None = None  # Distance to measure, m; None for the true one.
+        self.dead = False  # Whether it does not answer at all.
         super().__init__(levels={keys.echo: 0})
 
     def output_changed(self, t: int, pin: int, level: float) -> list[Edge]:

@@ -73,9 +73,6 @@ class Mpu6050(I2cDevice):
         """Return acceleration forward and left in m/s², and yaw rate to the left in rad/s.
 
         Gravity is part of the acceleration.
-
-        Raises:
-            RobotError: If it does not respond, or sleeps, for example after a loss of power.
         """
         measured = self.read_registers(_ACCEL_XOUT_H, _MEASURED.size)
         x, y, z, _, _, _, yaw = _MEASURED.unpack(measured)

@@ -88,21 +88,17 @@ class Pca9685(I2cDevice):
     The state of each channel is cached, so that unchanged widths are not sent again. A failed
     transfer may have taken partial effect, so after one the state of all channels is unknown, and
     the outputs are disabled, if there is a pin for it, until all channels have been rewritten.
-
-    Attributes:
-        steps: Width of the pulses of each open channel, steps of 1/4096 of the period; None if it
-            is unknown.
-        step_us: Width of a step, µs: 4.88 µs at 50 Hz.
     """
 
     def __init__(self, keys: Pca9685Keys, hz: int, hardware: Hardware) -> None:
         super().__init__("The PCA9685", keys, hardware)
         self.hz = hz
         self.output_enable = keys.output_enable
+        # Width of each open channel's pulses, steps of 1/4096 of the period; None if unknown.
         self.steps: dict[int, int | None] = {}
         self._clock = hardware.clock
         self._prescale = round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1  # Section 7.3.5.
-        self.step_us = (self._prescale + 1) / _OSCILLATOR_MHZ
+        self.step_us = (self._prescale + 1) / _OSCILLATOR_MHZ  # 4.88 µs at 50 Hz.
         self._must_start = False
         self._unchanged = 0
         self._enable: Any = None

@@ -46,8 +46,7 @@ NO_PIN: Final = OptionalPin(-1)
 def bcm(written: object) -> int:
     """Parse a pin into its BCM number.
 
-    Raises:
-        ValueError: If there is no such pin; the message is a reason after a comma, or empty.
+    The message of a ValueError is a reason after a comma, or empty.
     """
     number = written
     if isinstance(written, str) and (match := _WRITTEN.fullmatch(written)):
@@ -64,14 +63,10 @@ def bcm(written: object) -> int:
 
 
 class EdgeInput:
-    """Input with a callback on each change of its level.
+    """Input with an internal resistor that pulls it "up" or "down".
 
-    Args:
-        pin: BCM number.
-        pull: Direction of the internal pull resistor, "up" or "down".
-        factory: Pin factory of gpiozero.
-        changed: Called with the time, s, by the clock of `factory`, and the new level; lgpio calls
-            it in a thread.
+    On each change of its level, `changed` is called with the time, s, by the clock of gpiozero's
+    `factory`, and the new level; lgpio calls it in a thread.
     """
 
     def __init__(

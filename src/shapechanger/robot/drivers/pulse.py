@@ -369,12 +369,9 @@ class SpeedController:
         self._armed = self._braked = self._reverses = False
 
     def __call__(self, value: float | None, now_ns: int) -> float:
-        """Return the value for the motor, -1 to 1.
+        """Return the value for the motor, -1 to 1, from the value of the pulses, -1 to 1.
 
-        Args:
-            value: Value of the pulses, -1 to 1; None without pulses or power, when it stops and
-                must see neutral again.
-            now_ns: Time, ns.
+        Without pulses or power, None, it stops and must see neutral again.
         """
         if value is None:
             self._armed = self._braked = self._reverses = False

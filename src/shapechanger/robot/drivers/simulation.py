@@ -15,29 +15,18 @@ if TYPE_CHECKING:  # This module needs NumPy, which a guard must not load.
 
 
 class Edge(NamedTuple):
-    """A change of an input pin.
+    """A change of an input pin."""
 
-    Attributes:
-        t: Time of the change, ns.
-        pin: BCM number.
-        level: Level from then on, 0 or 1.
-    """
-
-    t: int
-    pin: int
-    level: int
+    t: int  # Time of the change, ns.
+    pin: int  # BCM number.
+    level: int  # Level from then on, 0 or 1.
 
 
 class Pulse(NamedTuple):
-    """Servo pulses.
+    """Servo pulses."""
 
-    Attributes:
-        us: Width in microseconds; 0 for none.
-        hz: Frequency, Hz.
-    """
-
-    us: float
-    hz: float
+    us: float  # Width in microseconds; 0 for none.
+    hz: float  # Frequency, Hz.
 
 
 NO_PULSE: Final = Pulse(0.0, 0.0)
@@ -54,13 +43,9 @@ class PwmChannel(NamedTuple):
 
 @dataclass(slots=True)
 class Levels:
-    """State of all outputs.
+    """State of all outputs: duty cycles, 0 to 1, and servo pulses, keyed by BCM number or channel.
 
-    Attributes:
-        duties: Duty cycle of each driven pin, 0 to 1, keyed by BCM number.
-        pulses: Servo pulses, keyed by pin.
-        channels: Pulses, keyed by channel of a chip.
-        edges_ns: Time of the last change of a pin between low and high, ns, without PWM.
+    `edges_ns` has the time of each pin's last change between low and high, ns, without PWM.
     """
 
     duties: dict[int, float] = field(default_factory=dict[int, float])
@@ -91,26 +76,18 @@ DutyOf = Callable[[Levels, int], float]
 
 
 class WiredOutput(NamedTuple):
-    """State of an output.
+    """State of an output."""
 
-    Attributes:
-        value: Value from -1 to 1, on the scale of its driver; None for a servo or speed controller
-            without pulses or power.
-        at_rest: Whether it is in the state after a stop; a motor with any duty above 0 is not.
-    """
-
+    # Value from -1 to 1, on the scale of its driver; None for a servo or speed controller without
+    # pulses or power.
     value: float | None
-    at_rest: bool
+    at_rest: bool  # Whether it is in the state after a stop; a motor with any duty above 0 is not.
 
 
 class SimulatedChip:
-    """A chip at one address of an I2C bus.
+    """A chip at one address of an I2C bus."""
 
-    Attributes:
-        is_logged: Whether the ledger records the bytes written to it.
-    """
-
-    is_logged = True
+    is_logged = True  # Whether the ledger records the bytes written to it.
 
     @property
     def pulses(self) -> Sequence[Pulse]:
@@ -130,18 +107,11 @@ I2cChips = Mapping[tuple[int, int], SimulatedChip]
 
 
 class SimulatedSensor:
-    """A sensor at a twin's board; subclasses override the methods that they need.
+    """A sensor at a twin's board; subclasses override the methods that they need."""
 
-    Attributes:
-        chips: Its chips on I2C buses.
-        levels: Level of each pin that it drives.
-    """
-
-    def __init__(
-        self, chips: I2cChips | None = None, levels: Mapping[int, int] | None = None
-    ) -> None:
+    def __init__(self, chips: I2cChips | None = None, levels: dict[int, int] | None = None) -> None:
         self.chips: I2cChips = chips or {}
-        self.levels: Mapping[int, int] = levels or {}
+        self.levels = levels or {}  # Level of each pin that it drives.
 
     def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
         """Return the edges between two times, ns, for the readings `seen` of the world."""

@@ -61,18 +61,14 @@ class Switch:
 
 
 class SimulatedSwitch(SimulatedSensor):
-    """Bumper switches to ground (pull "up") or to 3.3 V, all pressed at once.
-
-    Attributes:
-        held: Whether something outside the world presses them.
-    """
+    """Bumper switches to ground (pull "up") or to 3.3 V, all pressed at once."""
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
         keys = SwitchKeys.of(plan.settings)
         self._pins = keys.pins
         self._open = int(keys.pull == "up")
         self._pressed = False
-        self.held = False
+        self.held = False  # Whether something outside the world presses them.
         super().__init__(levels=dict.fromkeys(keys.pins, self._open))
 
     def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:

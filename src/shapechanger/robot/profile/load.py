@@ -23,7 +23,7 @@ CAMERAS: Final = {"ribbon": "picamera2", "usb": "v4l2", "none": ""}
 
 
 def shipped_profiles() -> dict[str, Path]:
-    """Return the profiles that ship with the package: name to file."""
+    """Return the profiles that ship with the package, keyed by name."""
     return {path.stem: path for path in sorted(_SHIPPED.glob(f"*{_SUFFIX}"), key=lambda p: p.stem)}
 
 
@@ -61,11 +61,7 @@ def load_profile(path: str | os.PathLike[str]) -> Profile:
 
 
 def profile_text(path: str | os.PathLike[str]) -> str:
-    """Read the text of a profile.
-
-    Raises:
-        ProfileError: If the file is missing, unreadable or not UTF-8.
-    """
+    """Read the text of a profile."""
     path = Path(path)
     try:
         with path.open("rb") as file:

@@ -118,15 +118,7 @@ GIVEN: Final = ("name", "measures", "settings", "rows")
 
 
 def read_profile(text: str, path: Path) -> Profile:
-    """Decode a profile.
-
-    Args:
-        text: TOML.
-        path: The file that it comes from, for error messages.
-
-    Raises:
-        ProfileError: If the text is not TOML or not a valid profile; names the file and the line.
-    """
+    """Decode a profile; a ProfileError names the file `path` and the line."""
     text = text.replace("\r\n", "\n")
     root = Table(path, text, (), _toml(text, path))
     for name in root.keys:

@@ -30,11 +30,8 @@ def line_of(text: str, place: Place) -> int:
     """Return the line on which a table or key of a TOML text begins, from 1.
 
     `tomllib` keeps no line numbers, but the beginning of a text up to the end of a statement is
-    valid TOML, so the line follows from the shortest beginning with the key.
-
-    Args:
-        text: Valid TOML, with Unix line ends.
-        place: The table or key; for a missing one the line of its table is returned.
+    valid TOML, so the line follows from the shortest beginning with the key. The text must have
+    Unix line ends. For a missing key the line of its table is returned.
     """
     lines = text.split("\n")
 
@@ -125,20 +122,13 @@ def _pin(kind: type[Pin], written: Any) -> Pin:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One table of a file, and its place.
-
-    Attributes:
-        path: The file.
-        text: The whole text of the file.
-        place: Path of the table.
-        keys: Keys and nested tables of the table; any other type is refused.
-        decoded: All tables of the file that were decoded so far, with their `Keys`.
-    """
+    """One table of a file, and its place."""
 
     path: Path
-    text: str
+    text: str  # The whole text of the file.
     place: Place
-    keys: dict[str, Any]
+    keys: dict[str, Any]  # Keys and nested tables of the table; any other type is refused.
+    # All tables of the file that were decoded so far, with their `Keys`.
     decoded: list[tuple[Table, Keys]] = field(default_factory=list["tuple[Table, Keys]"])
 
     def __post_init__(self) -> None:
@@ -197,13 +187,10 @@ class Table:
         given: Mapping[str, Any] | None = None,
         drivers: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> list[Any]:
-        """Return one value of each type, whose fields together are the keys of the table.
+        """Return one value of each Struct or dataclass, whose fields are the keys of the table.
 
-        Args:
-            kinds: Structs and dataclasses.
-            given: Fields that are not keys of the table.
-            drivers: Chips from which a key of the table selects, keyed by this key; the error about
-                an unknown key names the chips that have it.
+        `given` are fields that are not keys of the table. `drivers` are the chips from which a key
+        of the table selects; the error about an unknown key names the chips that have it.
         """
         given = given or {}
         known = {n: one for kind in kinds for n, one in fields_of(kind).items() if n not in given}

@@ -35,11 +35,8 @@ START_NS: Final = 1_000_000_000
 """First time of the twin's clock; not 0, which could mean "never"."""
 
 _WORLD_STEP_NS: Final = 10_000_000
-_LOOK_FOR_READER_S: Final = 0.05
-"""Interval of checks for a reader of the images while time stands still."""
-_LATER: Final = object()
-"""Result of a function to whose caller the board replies later, or never."""
-
+_LOOK_FOR_READER_S: Final = 0.05  # Interval of checks for a reader while time stands still.
+_LATER: Final = object()  # Result of a function to whose caller the board replies later, or never.
 _log = logging.getLogger(__name__)
 _decode_call: Callable[[bytes], Call] = msgspec.msgpack.Decoder(Call).decode
 

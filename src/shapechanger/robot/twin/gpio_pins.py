@@ -10,8 +10,7 @@ from gpiozero.pins.pi import PiFactory, PiPin
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.twin.rpc import BoardClient
 
-_REVISION: Final = 0xC03115
-"""Revision code of a Raspberry Pi 4B with 4 GB; all newer models have the same header."""
+_REVISION: Final = 0xC03115  # Raspberry Pi 4B with 4 GB; all newer models have the same header.
 
 
 class TwinPin(PiPin):

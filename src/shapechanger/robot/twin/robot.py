@@ -22,8 +22,7 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.operator import Operator as Operator
 from shapechanger.robot.twin.start import BoardAt, end
 
-_READY: Final = "ready.json"
-"""File that the daemon writes when it can be reached."""
+_READY: Final = "ready.json"  # File that the daemon writes when it can be reached.
 _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
 _READY_S: Final = 60.0
 _END_S: Final = 10.0
@@ -34,15 +33,8 @@ _LOG: Final = 2000  # Length of the end of a log in error notes, characters.
 class RunningRobot:
     """A robot that is served by processes on this machine until `close`.
 
-    Args:
-        temporary: Whether `close` removes the folder.
-
-    Attributes:
-        folder: Folder of the robot's files: the twin's ledger and socket, the key and the log.
-        supervisor: Process of the robot's supervisor.
-
-    Raises:
-        RobotError: If the robot does not start.
+    Its `folder` has the twin's ledger and socket, the key and the log; `close` removes it if it is
+    `temporary`.
     """
 
     def __init__(
@@ -91,11 +83,7 @@ class RunningRobot:
         return Operator(BoardAt(self.folder).socket_path)
 
     def pid_of(self, program: Literal["guard", "daemon"]) -> int:
-        """Return the process id of a program of the robot.
-
-        Raises:
-            RobotError: If the program does not run at the moment.
-        """
+        """Return the process id of a program of the robot."""
         parent = self.supervisor.pid
         children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
         for pid in children:
@@ -112,11 +100,7 @@ class RunningRobot:
     def await_restart(self) -> dict[str, Any]:
         """Wait until the daemon can be reached, also after a restart.
 
-        Returns:
-            The "port" of the daemon, and the "fingerprint" of its certificate.
-
-        Raises:
-            RobotError: If the daemon does not start in time.
+        Return the "port" of the daemon, and the "fingerprint" of its certificate.
         """
         path = self.folder / _READY
         until_s = time.monotonic() + _READY_S

@@ -31,15 +31,12 @@ _MAX_SOCKET_PATH: Final = 100  # Longest path of a socket, bytes; the limit of L
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A world and the body in it.
+    """A world and the body in it."""
 
-    Attributes:
-        opener: Function that opens the world, as "module:function"; "" for the plain room, which
-            needs no simulator. It is called with the arguments of `open_world` except `place`.
-        arguments: Further keyword arguments of the opener, JSON values.
-    """
-
+    # Function that opens the world, as "module:function"; "" for the plain room, which needs no
+    # simulator. It is called with the arguments of `open_world` except `place`.
     opener: str = ""
+    # Further keyword arguments of the opener, JSON values.
     arguments: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
@@ -47,10 +44,6 @@ def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, 
     """Open the world of a place for a robot whose outputs move `parts`.
 
     The `seed` selects the surroundings and the start.
-
-    Raises:
-        ImportError: If the module of the opener is not installed.
-        ShapechangerError: If the opener refuses its arguments or the robot, or needs an extra.
     """
     if not place.opener:
         plan = camera or CameraPlan("")
@@ -97,11 +90,7 @@ class BoardAt:
         return "shapechanger.robot.twin.hardware:connect", self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
-        """Return a camera plan for a profile that reads the images of this board.
-
-        Raises:
-            RobotError: If the board has no camera.
-        """
+        """Return a camera plan for a profile that reads the images of this board."""
         if not self.fifo_path.is_fifo():
             raise RobotError("This twin was started without a camera.")
         return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})
@@ -139,16 +128,11 @@ def start_board(
     Args:
         wiring: Plan with the simulated wiring.
         clock: The machine's clock ("real"), or one that only clients advance ("twin").
-        folder: Existing folder for socket, ledger and pipe; it must not have files of another
-            board.
+        folder: Existing folder for socket, ledger and pipe, without files of another board.
         camera: Front camera; None without a camera.
-        seed: Seed of the surroundings, the first start and everything random.
+        seed: Seed of everything random, 0 to 2^32 - 1.
         one_shot_ms: Hold time of the enable line's one-shot, ms; None without a one-shot.
         place: Place of the vehicle; None for the plain room.
-
-    Raises:
-        RobotError: If the board does not start, the folder cannot be used, or the seed is not a
-            whole number from 0 to 2^32 - 1.
     """
     seed = check_seed(seed, RobotError)
     TwinWiring(wiring, one_shot_ms)  # Refuse a robot that cannot be simulated.

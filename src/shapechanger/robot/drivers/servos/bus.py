@@ -50,24 +50,14 @@ class ServoBus:
     silence all later ones. The first servo that is missing in a cycle becomes a suspect, and the
     others are read once more without it. Suspects are read alone, one per cycle. So a cycle waits
     for at most two timeouts.
-
-    Args:
-        settings: The bus and its servos; `add` adds more servos until the bus is opened.
-        hardware: The hardware with the port of the bus.
-
-    Attributes:
-        servos: Servos, keyed by id.
-        users: Names of the outputs that use the bus; closing the last output closes the bus.
-        mode: Mode of the bus.
-        is_ready: Whether `set_up` has succeeded.
     """
 
     def __init__(self, settings: BusSettings, hardware: Hardware) -> None:
         self._settings = settings
-        self.servos: dict[int, TendonServo] = {}
-        self.users: set[str] = set()
+        self.servos: dict[int, TendonServo] = {}  # Keyed by id.
+        self.users: set[str] = set()  # Outputs that use the bus; the last one closes it.
         self.mode: Mode = "off"
-        self.is_ready = False
+        self.is_ready = False  # Whether `set_up` has succeeded.
         self._hardware = hardware
         self._opened = ExitStack()
         self._suspects: list[int] = []  # Servos that did not answer when they were last read.
@@ -79,7 +69,7 @@ class ServoBus:
             self.add(servo)
 
     def add(self, servo: ServoSettings) -> TendonServo:
-        """Add a servo."""
+        """Add a servo, before the bus is opened."""
         self.servos[servo.id] = made = TendonServo(servo, self._settings)
         return made
 
@@ -98,9 +88,6 @@ class ServoBus:
         """Open the bus once all of its outputs are open, and set up servos that have power.
 
         The servos do not move.
-
-        Raises:
-            RobotError: If a servo does not respond, or is not the expected one.
         """
         self.open()
         if self._family.has_watchdog:
@@ -109,13 +96,9 @@ class ServoBus:
                 one.set_zero(knows_turns=True)
 
     def ready(self, alive: Callable[[], object] = lambda: None) -> None:
-        """Clear all faults before the robot is armed, without any motion.
+        """Clear all faults before the robot is armed, without any motion; refuse if one persists.
 
-        Args:
-            alive: Triggers the enable line and the supervisor; called at least every 50 ms.
-
-        Raises:
-            RobotError: If a fault persists.
+        `alive` triggers the enable line and the supervisor; it is called at least every 50 ms.
         """
         if self.reason or not self.is_ready:
             self.let_go()
@@ -131,14 +114,7 @@ class ServoBus:
             )
 
     def flush(self, *, grip: bool) -> None:
-        """Send the requested tensions and lengths.
-
-        Args:
-            grip: Whether released servos are energised again.
-
-        Raises:
-            RobotError: If a servo does not obey.
-        """
+        """Send the requested tensions and lengths; `grip` energises released servos again."""
         self._require_release()
         if self.reason:
             return  # The following cycles complete the stop.
@@ -171,8 +147,7 @@ class ServoBus:
     def set_up(self, alive: Callable[[], object] = lambda: None) -> None:
         """Check and prepare all servos, without torque, and clear all faults.
 
-        Raises:
-            RobotError: If a servo does not answer, or does not match its settings.
+        RobotError is raised if a servo does not answer, or does not match its settings.
         """
         self.is_ready = False
         if self.mode != "silent":  # A servo may still pull, until all have been set up.
@@ -204,8 +179,7 @@ class ServoBus:
     def hold(self) -> None:
         """Enable the torque of all servos, with zero tension until the first goal.
 
-        Raises:
-            RobotError: If there is a fault, or a servo refuses; all torques are then off.
+        RobotError is raised if there is a fault, or a servo refuses; all torques are then off.
         """
         if self.mode != "off" or self.reason or not self.is_ready:
             why = "they are held already." if self.is_ready else "they are not set up."
@@ -221,8 +195,7 @@ class ServoBus:
     def cycle(self, now_ns: int) -> dict[str, dict[str, float]]:
         """Read the state of all servos, and continue a stop in progress.
 
-        Returns:
-            Readings keyed by tendon, see `TendonServo.see`, without servos that did not answer.
+        The readings are keyed by tendon, see `TendonServo.see`, without silent servos.
         """
         if self.mode == "silent" or not self.is_ready:
             return {}
@@ -384,9 +357,6 @@ class TendonOutput:
     The value 0 is the pretension in both kinds of control, so that all stops end the same. The
     value 1 is the largest tension; with control "length", values above 0 go from the longest to the
     shortest length.
-
-    Attributes:
-        device: The bus, which acts when all outputs are written.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
@@ -394,15 +364,14 @@ class TendonOutput:
         bus = _OPEN.get(place)
         if bus is None or not bus.users:
             bus = _OPEN[place] = ServoBus(BusSettings.of(plan.settings), hardware)
-        self.device = bus
+        self.device = bus  # The bus, which acts when all outputs are written.
         self._servo = bus.add(ServoSettings.of(plan.settings))
         bus.users.add(self._servo.settings.name)
 
     def write(self, value: float, now_ns: int) -> float:
         """Request a value, 0 to 1, from the next flush on; negative values count as 0.
 
-        Returns:
-            The value in effect: 0 if the bus has a fault and lets go.
+        Return the value in effect: 0 if the bus has a fault and lets go.
         """
         if self.device.reason:
             return 0.0
@@ -429,10 +398,7 @@ class TendonOutput:
 
 
 class TendonSensor:
-    """Runs one cycle of the bus per reading; see `SensorDriver`.
-
-    The outputs on the bus must be open.
-    """
+    """Runs one cycle of the bus per reading; see `SensorDriver`. Its outputs must be open."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         device: str = plan.settings["device"]
@@ -442,11 +408,7 @@ class TendonSensor:
         self._bus = bus
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Run a cycle and return its readings, such as `FDP/length`; see `TendonServo.see`.
-
-        Raises:
-            RobotError: If there is a fault.
-        """
+        """Run a cycle and return its readings, such as `FDP/length`; see `TendonServo.see`."""
         seen = self._bus.cycle(now_ns)
         if self._bus.reason:
             raise RobotError(self._bus.reason)

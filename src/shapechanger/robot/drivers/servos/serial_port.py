@@ -37,13 +37,7 @@ class SerialServoPort(PortHandler):
     """The SDK's port, which sends instructions and receives replies; see `ServoPort`.
 
     Its timeout is as short as the bus allows. The SDK itself busy-waits 34 ms for each missing
-    answer, by the wall clock, which is too long for a stop.
-
-    Args:
-        settings: The bus, whose family determines the packets.
-
-    Attributes:
-        has_stray: Whether a late answer was found before a request; the reader resets it.
+    answer, by the wall clock, which is too long for a stop. The family determines the packets.
     """
 
     def __init__(self, settings: BusSettings) -> None:

@@ -21,13 +21,9 @@ from shapechanger.robot.hardware import ServoReply
 
 
 class ServoPort(Protocol):
-    """Port of a servo bus, serial or simulated; methods raise RobotError if the bus is lost.
+    """Port of a servo bus, serial or simulated; methods raise RobotError if the bus is lost."""
 
-    Attributes:
-        has_stray: Whether a late answer was found before a request; the reader resets it.
-    """
-
-    has_stray: bool
+    has_stray: bool  # Whether a late answer was found before a request; the reader resets it.
 
     def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
         """Read bytes of several servos; return the replies, keyed by id, without silent servos."""
@@ -39,7 +35,6 @@ class ServoPort(Protocol):
 
     def close(self) -> None:
         """Close the port."""
-        ...
 
 
 # A single lost packet must not keep a rig from starting. Cycles never retry.
@@ -79,35 +74,21 @@ class TendonServo:
     winds in nearly as fast as without load is an earlier sign, but only if its current clearly
     exceeds the friction of the gears. A tendon that snaps while its servo stands still at the
     pretension is detected at the next pull.
-
-    Args:
-        settings: Settings of the servo.
-        bus: Settings of the bus.
-
-    Attributes:
-        settings: Settings of the servo.
-        port: Port of the bus, once it is open.
-        zero: Position at the zero of the tendon, in counts; None if it is unknown.
-        position: Position, as last read, in counts.
-        goal: The last sent goal, in counts; see `ServoFamily.goal`.
-        tension: Requested tension, N.
-        length: Requested length beyond the zero, m; None to pull with the tension.
-        stopped_at_n: Tension from which a stop ramps down, N.
-        fault: First fault, as a sentence, until `clear`; empty without a fault.
-        missed: Cycles in a row without an answer.
     """
 
-    port: ServoPort
+    port: ServoPort  # Port of the bus, once it is open.
 
     def __init__(self, settings: ServoSettings, bus: BusSettings) -> None:
         self.settings = settings
         self._bus = bus
         self._model = settings.known
         self._family = self._model.family
-        self.zero: int | None = None
-        self.position = self.goal = 0
-        self.tension, self.stopped_at_n = settings.pretension_n, 0.0
-        self.length: float | None = None
+        self.zero: int | None = None  # Position at the tendon's zero, counts; None if unknown.
+        self.position = 0  # Position, as last read, counts.
+        self.goal = 0  # The last sent goal, counts; see `ServoFamily`.
+        self.tension = settings.pretension_n  # Requested tension, N.
+        self.length: float | None = None  # Requested length beyond the zero, m; None for tension.
+        self.stopped_at_n = 0.0  # Tension from which a stop ramps down, N.
         self.clear()
 
     def clear(self) -> None:
@@ -115,17 +96,11 @@ class TendonServo:
         self._slack_since_ns: int | None = None
         self._wrong: Counter[str] = Counter()
         self._was_late = False
-        self.fault = ""
-        self.missed = 0
+        self.fault = ""  # First fault, as a sentence.
+        self.missed = 0  # Cycles in a row without an answer.
 
     def request(self, tension: float, length: float | None = None) -> None:
-        """Request a tension, N, or with a length beyond the zero, m, its limit.
-
-        Both are clipped to their ranges.
-
-        Raises:
-            RobotError: If a number is not finite.
-        """
+        """Request a tension, N; with a length beyond the zero, m, its limit. Both are clipped."""
         servo = self.settings
         if not math.isfinite(tension) or not math.isfinite(length or 0.0):
             raise RobotError(f"{servo.label} cannot pull {tension} N to a length of {length} m.")

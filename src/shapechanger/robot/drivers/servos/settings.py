@@ -35,27 +35,18 @@ ModelName = Literal["XL330-M288", "XL330-M077", "XC330-M288", "XM430-W210", "XM4
 
 
 class Register(msgspec.Struct, frozen=True):
-    """A register of the control table.
+    """A register of the control table."""
 
-    Attributes:
-        name: Name in the manual.
-        address: Address of its first byte.
-        size: Size in bytes, little-endian.
-        sign: Code of negative numbers: "complement", or "bit" for a highest bit; "" if unsigned.
-        initial: Value at delivery, and after power-on if it is not in the EEPROM.
-        takes: Ranges of permitted values; empty if the register is read-only.
-        value: Value that the register must have; None for any.
-        kept_bits: Bits that are not changed when `value` is set.
-    """
-
-    name: str
-    address: int
-    size: int
+    name: str  # Name in the manual.
+    address: int  # Address of its first byte.
+    size: int  # Size in bytes, little-endian.
+    # Code of negative numbers: "complement", or "bit" for a highest bit; "" if unsigned.
     sign: Literal["", "complement", "bit"] = ""
-    initial: int = 0
+    initial: int = 0  # Value at delivery, and after power-on if it is not in the EEPROM.
+    # Ranges of permitted values; empty if the register is read-only.
     takes: tuple[tuple[int, int], ...] = ()
-    value: int | None = None
-    kept_bits: int = 0
+    value: int | None = None  # Value that the register must have; None for any.
+    kept_bits: int = 0  # Bits that are not changed when `value` is set.
 
     def encode(self, value: int) -> bytes:
         """Encode a value."""
@@ -74,49 +65,35 @@ class Register(msgspec.Struct, frozen=True):
 class ServoFamily(msgspec.Struct, frozen=True):
     """A family of servos, which share registers and packets.
 
-    Attributes:
-        name: Name of the family.
-        protocol: Version of the packets in `dynamixel_sdk`. Feetech uses 1.0 with the instructions
-            of 2.0 for several servos. Addresses, lengths and checksums have 1 or 2 bytes.
-        most_id: Highest id.
-        baud_rates: Baud rates of servos and SDK.
-        has_watchdog: Whether a servo stops by itself when its bus is silent. If false, a power
-            switch must stop it, and without power it loses its count of turns.
-        alert: Bits of a reply's error that are set while the hardware error status is not 0.
-        refused: Bits of a reply's error with the reason of a refusal.
-        errors: Descriptions of the bits of the hardware error status.
-        speed_rpm: Unit of the speed, turns per minute.
-        modes: Value of `mode` for each supported control.
-        eeprom_end: First address after the EEPROM.
-        registers: Registers keyed by purpose; others only have a `value` to set.
+    Its `registers` are keyed by purpose; registers under other keys only have a `value` to set.
 
-            - `model_number`, `firmware`: Number of the model and version of the firmware.
-            - `mode`: Operating mode.
-            - `most`: Limit of `goal`, in the EEPROM.
-            - `torque_enable`: 1 for torque, 0 for none.
-            - `mark`: Reveals a restart, because it is 0 only after one: the bus watchdog if there
-              is one, or the acceleration.
-            - `goal`: Goal of the current; with control of the length, limit of the current. In a
-              family without control of the tension, limit in thousandths of the stall torque.
-            - `goal_position`: Goal position.
-            - `hardware_error`: Hardware error status.
-            - `lock`: Must be 0 to write to the EEPROM; families without it need the torque off.
-            - `present`: Block of the present values that follow.
-            - `current`, `speed`, `position`, `voltage`, `temperature`: Present values in counts,
-              0.1 V and degrees Celsius.
+    - `mode`: Operating mode.
+    - `most`: Limit of `goal`, in the EEPROM.
+    - `torque_enable`: 1 for torque, 0 for none.
+    - `mark`: Reveals a restart, because it is 0 only after one: the bus watchdog if there is one,
+      or the acceleration.
+    - `goal`: Goal of the current; with control of the length, limit of the current. In a family
+      without control of the tension, limit in thousandths of the stall torque.
+    - `lock`: Must be 0 to write to the EEPROM; families without it need the torque off.
+    - `present`: Block of the present values `current`, `speed`, `position`, `voltage` and
+      `temperature`: counts, 0.1 V and degrees Celsius.
     """
 
     name: str
+    # Version of the packets in `dynamixel_sdk`. Feetech uses 1.0 with the instructions of 2.0 for
+    # several servos. Addresses, lengths and checksums have 1 or 2 bytes.
     protocol: float
-    most_id: int
-    baud_rates: tuple[int, ...]
+    most_id: int  # Highest id.
+    baud_rates: tuple[int, ...]  # Baud rates of servos and SDK.
+    # Whether a servo stops by itself when its bus is silent. If false, a power switch must stop it,
+    # and without power it loses its count of turns.
     has_watchdog: bool
-    alert: int
-    refused: int
-    errors: Mapping[int, str]
-    speed_rpm: float
-    modes: Mapping[Control, int]
-    eeprom_end: int
+    alert: int  # Bits of a reply's error that are set while the hardware error status is not 0.
+    refused: int  # Bits of a reply's error with the reason of a refusal.
+    errors: Mapping[int, str]  # Descriptions of the bits of the hardware error status.
+    speed_rpm: float  # Unit of the speed, turns per minute.
+    modes: Mapping[Control, int]  # Value of `mode` for each supported control.
+    eeprom_end: int  # First address after the EEPROM.
     registers: Mapping[str, Register]
 
     def __getitem__(self, name: str) -> Register:
@@ -135,43 +112,26 @@ class ServoFamily(msgspec.Struct, frozen=True):
 
 
 class ServoModel(msgspec.Struct, frozen=True, array_like=True):
-    """Model of a servo, a row of `servos.toml`; values of motor and gears refer to the output.
-
-    Attributes:
-        name: Name of the model.
-        family_name: Name of its family.
-        number: Model number.
-        ampere_per_count: Unit of its present current, A.
-        most_counts: Largest value of its `goal`, see `ServoFamily.registers`.
-        stall_nm, stall_a: Stall torque and current at `volts`, N·m and A.
-        no_load_rpm: Speed without load at `volts`, turns per minute.
-        volts, least_v, most_v: Nominal, lowest and highest operating voltage, V.
-        most_c: Temperature at which it shuts itself off, degrees Celsius.
-        shutdown: Hardware errors that shut it off, as bits.
-        least_firmware: First version with a reliable bus watchdog.
-        inertia: Inertia of motor and gears, kg·m2.
-        friction_nm, viscous: Coulomb and viscous friction of the gears, N·m and N·m·s/rad.
-        is_measured: Whether the friction was measured.
-    """
+    """Model of a servo, a row of `servos.toml`; values of motor and gears refer to the output."""
 
     name: str
     family_name: str
-    number: int
-    ampere_per_count: float
-    most_counts: int
-    stall_nm: float
-    stall_a: float
-    no_load_rpm: float
-    volts: float
-    least_v: float
-    most_v: float
-    most_c: int
-    shutdown: int
-    least_firmware: int
-    inertia: float
-    friction_nm: float
-    viscous: float
-    is_measured: bool
+    number: int  # Model number.
+    ampere_per_count: float  # Unit of its present current, A.
+    most_counts: int  # Largest value of its `goal`, see `ServoFamily`.
+    stall_nm: float  # Stall torque at `volts`, N·m.
+    stall_a: float  # Stall current at `volts`, A.
+    no_load_rpm: float  # Speed without load at `volts`, turns per minute.
+    volts: float  # Nominal voltage, V.
+    least_v: float  # Lowest operating voltage, V.
+    most_v: float  # Highest operating voltage, V.
+    most_c: int  # Temperature at which it shuts itself off, degrees Celsius.
+    shutdown: int  # Hardware errors that shut it off, as bits.
+    least_firmware: int  # First version with a reliable bus watchdog.
+    inertia: float  # Inertia of motor and gears, kg·m2.
+    friction_nm: float  # Coulomb friction of the gears, N·m.
+    viscous: float  # Viscous friction of the gears, N·m·s/rad.
+    is_measured: bool  # Whether the friction was measured.
 
     @property
     def family(self) -> ServoFamily:

@@ -50,17 +50,10 @@ _HEAT_S: Final = 120.0
 
 
 class SimulatedMotor:
-    """A motor with its gears, its spool and its end of a tendon.
+    """A motor with its gears, its spool and its end of a tendon of a `stiffness`, N/m.
 
-    Args:
-        settings: The servo, at whose zero the tendon is just taut.
-        stiffness: Stiffness of the tendon, N/m.
-
-    Attributes:
-        angle, speed: Angle of the spool over many turns, rad, and its speed, rad/s.
-        current, temperature: Current, A, and temperature, degrees Celsius.
-        tension: Tension of the tendon, N.
-        snapped: Whether the tendon is torn.
+    It has an `angle` over many turns, rad, a `speed`, rad/s, a `current`, A, a `temperature`,
+    degrees Celsius, and the `tension` of the tendon, N. At the servo's zero, the tendon is taut.
     """
 
     def __init__(self, settings: ServoSettings, stiffness: float = CABLE_N_PER_M) -> None:
@@ -74,7 +67,7 @@ class SimulatedMotor:
         self._taut = self.angle = (settings.zero + 0.5) / _COUNTS_PER_RAD
         self.speed = self.current = self.tension = 0.0
         self.temperature = _ROOM_C
-        self.snapped = False
+        self.snapped = False  # Whether the tendon is torn.
 
     def current_at(self, volts: float) -> float:
         """Return the current at a voltage and the present speed, A."""
@@ -140,26 +133,18 @@ _STALL_AT: Final = 2.0 * math.pi / 32.0  # Error of the position at the stall cu
 
 
 class SimulatedServo:
-    """A simulated servo.
+    """A simulated servo, whose tendon has a `stiffness`, N/m.
 
-    Args:
-        settings: Settings of the servo.
-        stiffness: Stiffness of its tendon, N/m.
-
-    Attributes:
-        family: Family of the servo.
-        values: Values of its registers.
-        mute, deaf: Whether it obeys without answering, and whether it receives no instructions.
-        motor: Its motor.
-        volts: Voltage of its supply; 0 without power.
-        pulls_a: Goal current in effect, A, with its sign; with control of the length, its limit.
+    `pulls_a` is its goal current in effect, A, with its sign; with control of the length, its
+    limit.
     """
 
     def __init__(self, settings: ServoSettings, stiffness: float) -> None:
         self._model = model = settings.known
         self.family = family = model.family
-        self.mute = self.deaf = False
-        self.volts = model.volts
+        self.mute = False  # Whether it obeys without answering.
+        self.deaf = False  # Whether it receives no instructions.
+        self.volts = model.volts  # Voltage of its supply; 0 without power.
         self.motor = SimulatedMotor(settings, stiffness)
         own = {name: one for name, one in family.registers.items() if name != "present"}
         self._names = {one.address: name for name, one in own.items()}
@@ -317,7 +302,6 @@ class TendonWorld(Protocol):
 
     def connect(self, tendons: Sequence[str], rig: Rig) -> None:
         """Attach the tendons of a rig."""
-        ...
 
     def travels(self) -> Sequence[float]:
         """Return how far the end of each tendon has moved towards its spool since the start, m."""
@@ -342,17 +326,9 @@ def pull_spring(travel_m: float, tension_n: float, dt_s: float) -> float:
 
 
 class Rig:
-    """A bus with its servos, and the load that their tendons pull.
+    """A bus with its servos, keyed by id, and the load that their tendons pull.
 
-    Args:
-        settings: The bus.
-        world: World of the robot; in a world without tendons the servos pull springs.
-
-    Attributes:
-        device: Device of the bus.
-        servos: Servos, keyed by id.
-        now_ns: Time of the bus.
-        has_power: Whether the servos have power.
+    In a world without tendons the servos pull springs.
     """
 
     def __init__(self, settings: BusSettings, world: World | None = None) -> None:

@@ -162,11 +162,7 @@ class Bench:
         return _ProbeWatcher(self.probe, self._probed, Hardware())
 
     def close(self) -> list[str]:
-        """End robot and board, and put the pins of this machine at rest.
-
-        Returns:
-            Outputs that could not be put at rest.
-        """
+        """End robot and board, put this machine's pins at rest, and return the failures."""
         was_served = vars(self).pop("robot", None) is not None
         vars(self).pop("board", None)
         self.restarts = 0
