@@ -86,7 +86,6 @@ def test_a_bad_file_is_named_and_skipped(tmp_path: Path) -> None:
 
 @pytest.fixture
 def fifo(tmp_path: Path) -> Path:
-    """A named pipe."""
     path = tmp_path / "camera"
     os.mkfifo(path)
     return path
@@ -145,7 +144,6 @@ class _Kernel:
         self._queued: list[int] = []
 
     def ioctl(self, fd: int, call: int, data: Any) -> int:
-        """Handle one call."""
         self.calls.append(call)
         if call == api.SET_FORMAT:
             data.width, data.height = self._size
@@ -166,7 +164,6 @@ class _Kernel:
 
 
 def test_structures_have_the_kernels_sizes() -> None:
-    """The sizes of structures are part of the ioctl numbers."""
     for structure, call, size in (
         (api.Buffer, api.QUEUE, 88),
         (api.PixelFormat, api.SET_FORMAT, 208),
@@ -182,7 +179,6 @@ def test_structures_have_the_kernels_sizes() -> None:
 
 
 def test_a_webcam_returns_the_newest_frame_and_the_kernels_time(tmp_path: Path) -> None:
-    """Older and damaged buffers are skipped (with a fake kernel)."""
     kernel = _Kernel(tmp_path / "video0")
     camera = V4l2(_plan("v4l2", device=str(tmp_path / "video0")), kernel.ioctl)
     assert kernel.calls[-1] == api.STREAM_ON
@@ -214,7 +210,6 @@ def pi(monkeypatch: pytest.MonkeyPatch) -> Mock:
 
 
 def test_pi_camera_gives_jpeg_with_the_sensors_time(pi: Mock) -> None:
-    """Frames are JPEG with the sensor's timestamp, and requests are released (with a fake)."""
     plan = CameraPlan("picamera2", (32, 24), 25.0, 80, flip=True, settings={"number": 0})
     camera = open_camera(plan)
     pi.create_video_configuration.assert_called_once_with(

@@ -103,7 +103,6 @@ _BETWEEN = st.binary(max_size=40).filter(lambda data: b"\xff\xd8" not in data)
 @example(between=[b"\xff", b"\xff\xff", b"\xff\xd9", b"--boundary\r\n\r\n"], cuts=set(range(3000)))
 @example(between=[b""] * 4, cuts=set(range(3000)))
 def test_a_stream_yields_its_frames_and_no_others(between: list[bytes], cuts: set[int]) -> None:
-    """Frames are found with any bytes between them, for any sizes of the reads."""
     stream = between[0] + b"".join(map(operator.add, _FRAMES, between[1:]))
     found, skipped = _split(stream, sorted(cut for cut in cuts if cut < len(stream)))
     assert found == _FRAMES

@@ -45,7 +45,6 @@ class FakeGuard:
             self._socket.close()
 
     def tick(self) -> None:
-        """Apply all orders, and send the state."""
         while True:
             try:
                 data = self._socket.recv(MAX_DATAGRAM)
@@ -106,7 +105,6 @@ class FakeCamera(Camera):
         self._frames.put(why)
 
     def read(self) -> Frame:
-        """Return the next frame."""
         while True:
             frame = self._frames.get()
             if isinstance(frame, Frame):
@@ -130,11 +128,9 @@ class SteppedClock(Clock):
         self.captured_ns: int | None = None
 
     def now_ns(self) -> int:
-        """Return the time, ns."""
         return self.ns
 
     async def sleep(self, seconds: float) -> int | None:
-        """Advance the time, and let the guard tick."""
         await asyncio.sleep(0)
         self.steps.append(seconds)
         self.ns += round(seconds * 1e9)

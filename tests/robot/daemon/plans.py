@@ -45,7 +45,6 @@ def car_plan(**changes: Any) -> DaemonPlan:
 
 
 def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:
-    """Return a JPEG that is different for each number."""
     rng = np.random.default_rng(number)
     # The image has coarse blocks, because noise does not compress.
     coarse = rng.integers(0, 256, (size[1] // 8, size[0] // 8, 3), dtype=np.uint8)

@@ -19,24 +19,8 @@ from shapechanger.robot.daemon import camera as daemon_camera
 from shapechanger.robot.daemon import process
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.hardware import Clock
+from shapechanger.robot.link import messages as link
 from shapechanger.robot.link.authentication import fingerprint_of, make_proof
-from shapechanger.robot.link.messages import (
-    VERSION,
-    Acknowledge,
-    Arm,
-    Challenge,
-    ClientMessage,
-    Command,
-    Hello,
-    Lease,
-    Observation,
-    Refused,
-    RobotMessage,
-    Take,
-    Welcome,
-    decode_robot_message,
-    encode,
-)
 from tests.robot.daemon.fakes import FakeCamera, FakeGuard
 from tests.robot.daemon.plans import picture
 
@@ -60,18 +44,18 @@ class Client:
     def __init__(self, socket: aiohttp.ClientWebSocketResponse, certificate: bytes) -> None:
         self.socket = socket
         self.certificate = certificate
-        self.received: list[RobotMessage] = []
+        self.received: list[link.RobotMessage] = []
 
-    async def send(self, message: ClientMessage) -> None:
-        await self.socket.send_bytes(encode(message))
+    async def send(self, message: link.ClientMessage) -> None:
+        await self.socket.send_bytes(link.encode(message))
 
-    async def receive(self) -> RobotMessage | None:
+    async def receive(self) -> link.RobotMessage | None:
         """Return the next message, or None after the robot has closed the connection."""
         async with asyncio.timeout(PATIENCE_S):
             message = await self.socket.receive()
         if message.type is not aiohttp.WSMsgType.BINARY:
             return None
-        received = decode_robot_message(message.data)
+        received = link.decode_robot_message(message.data)
         self.received.append(received)
         return received
 
@@ -84,37 +68,36 @@ class Client:
 
     async def closed_with(self) -> str:
         """Return the reason that the robot gives when it closes the connection."""
-        refused = await self.expect(Refused)
+        refused = await self.expect(link.Refused)
         while not refused.fatal:
-            refused = await self.expect(Refused)
+            refused = await self.expect(link.Refused)
         assert await self.receive() is None
         return refused.reason
 
-    async def greet(self, key: bytes = b"", **hello: Any) -> Welcome:
-        """Authenticate."""
-        challenge = await self.expect(Challenge)
+    async def greet(self, key: bytes = b"", **hello: Any) -> link.Welcome:
+        challenge = await self.expect(link.Challenge)
         role = hello.setdefault("role", "program")
         proof = make_proof(key, challenge.nonce, self.certificate, role)
-        await self.send(Hello(**({"version": VERSION, "proof": proof} | hello)))
-        return await self.expect(Welcome)
+        await self.send(link.Hello(**({"version": link.VERSION, "proof": proof} | hello)))
+        return await self.expect(link.Welcome)
 
-    async def take(self) -> Lease:
-        await self.send(Take())
-        return await self.expect(Lease)
+    async def take(self) -> link.Lease:
+        await self.send(link.Take())
+        return await self.expect(link.Lease)
 
     async def obtain(self) -> None:
         while not (await self.take()).mine:
             pass
 
-    async def observe(self) -> Observation:
-        await self.send(Acknowledge())
-        return await self.expect(Observation)
+    async def observe(self) -> link.Observation:
+        await self.send(link.Acknowledge())
+        return await self.expect(link.Observation)
 
-    async def drive(self, seq: int, *values: float, answers: int | None = None) -> Observation:
+    async def drive(self, seq: int, *values: float, answers: int | None = None) -> link.Observation:
         """Send a command that answers a new observation, and return the next observation."""
         seen = (await self.observe()).seq if answers is None else answers
-        await self.send(Command(seq=seq, answers=seen, values=values or (0.0, 0.5)))
-        return await self.expect(Observation)
+        await self.send(link.Command(seq=seq, answers=seen, values=values or (0.0, 0.5)))
+        return await self.expect(link.Observation)
 
 
 @dataclass
@@ -142,7 +125,6 @@ class Running:
         return connection._conn.transport
 
     async def end(self) -> None:
-        """End the daemon, and wait for it."""
         self.daemon.end()
         async with asyncio.timeout(PATIENCE_S):
             await self.task
@@ -153,7 +135,6 @@ class Running:
 
     @contextlib.asynccontextmanager
     async def connect(self, **settings: Any) -> AsyncIterator[Client]:
-        """Connect without a hello."""
         context = ssl.create_default_context()
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
         async with self.session.ws_connect(
@@ -171,7 +152,7 @@ class Running:
 
     async def arm(self, client: Client, emergency: int = 0) -> None:
         seen = await client.observe()
-        await client.send(Arm(answers=seen.seq, emergency=emergency))
+        await client.send(link.Arm(answers=seen.seq, emergency=emergency))
 
     async def armed(self, client: Client) -> None:
         """Let a person take control and arm."""

@@ -36,8 +36,6 @@ class Ends:
 
 @pytest.fixture
 def ends(runner: asyncio.Runner) -> Iterator[Ends]:
-    """Both ends of the connection, in the event loop of the test."""
-
     async def connect() -> Ends:
         return Ends()
 

@@ -13,17 +13,7 @@ from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.session import Session
 from shapechanger.robot.guard.channel import GuardState, Order
-from shapechanger.robot.link.messages import (
-    VERSION,
-    Command,
-    Event,
-    Hello,
-    Lease,
-    Observation,
-    Ping,
-    Pong,
-    encode,
-)
+from shapechanger.robot.link import messages as link
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, guard_state
 
@@ -37,13 +27,13 @@ def new_hub(order: Callable[[Order], object] = lambda order: None) -> SessionHub
     return SessionHub(car_plan(), clock, order)
 
 
-def observed(hub: SessionHub, frame_sent: int | None = 0) -> Observation:
+def observed(hub: SessionHub, frame_sent: int | None = 0) -> link.Observation:
     return hub.observation(ANN, 7, frame_sent)
 
 
 def seen_at_50_ns(
     state: GuardState | None = None, *, frames: int = 3, frame_sent: int | None = 0
-) -> Observation:
+) -> link.Observation:
     """Build an observation at 50 ns, from a state of 40 ns and a frame of 30 ns."""
     hub = new_hub()
     for _ in range(frames):
@@ -81,7 +71,7 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
     hub = new_hub(orders.append)
     hub.take(ANN)
     hub.on_frame(Frame(b"jpeg", 30))
-    hub.command(ANN, Command(seq=9, answers=1, values=(0.0, 0.5), scale=0.5, ttl_ms=80))
+    hub.command(ANN, link.Command(seq=9, answers=1, values=(0.0, 0.5), scale=0.5, ttl_ms=80))
     hub.on_state(guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39))
     (order,) = orders
     assert (order.values, order.ttl_ms, order.frame_ns) == ((0.0, 0.25), 80, 30)
@@ -115,33 +105,33 @@ def test_a_person_can_always_connect() -> None:
 def test_a_client_may_send_one_second_of_messages_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session, "monotonic", lambda: 0.0)
     one = Session(1, new_hub(), Authenticator(), 10.0)
-    one.introduce(encode(Hello(version=VERSION, proof=b"")))
+    one.introduce(link.encode(link.Hello(version=link.VERSION, proof=b"")))
     for now_s, count in ((0.0, 10), (0.25, 2), (9.0, 10)):
         monkeypatch.setattr(session, "monotonic", lambda now_s=now_s: now_s)
         for _ in range(count):
-            one.receive(encode(Ping()))
+            one.receive(link.encode(link.Ping()))
         with pytest.raises(RobotRefused, match="Too many messages"):
-            one.receive(encode(Ping()))
+            one.receive(link.encode(link.Ping()))
 
 
 def test_a_client_keeps_the_newest_lease_and_events() -> None:
     client = Client(1)
-    client.post(Lease(mine=True, holder="a"))
-    client.post(Pong(token=1, now_ns=0))
-    client.post(Lease(mine=False, holder="b"))
+    client.post(link.Lease(mine=True, holder="a"))
+    client.post(link.Pong(token=1, now_ns=0))
+    client.post(link.Lease(mine=False, holder="b"))
     for number in range(1_000):
-        client.post(Event(name="bump", text="", at_ns=number))
-    events = [Event(name="bump", text="", at_ns=number) for number in range(968, 1_000)]
-    kept = [Pong(token=1, now_ns=0), Lease(mine=False, holder="b"), *events]
+        client.post(link.Event(name="bump", text="", at_ns=number))
+    events = [link.Event(name="bump", text="", at_ns=number) for number in range(968, 1_000)]
+    kept = [link.Pong(token=1, now_ns=0), link.Lease(mine=False, holder="b"), *events]
     assert list(iter(client.take, None)) == kept
 
 
 def test_a_client_with_too_many_unread_answers_is_expelled() -> None:
     client = Client(1)
     for number in range(256):
-        client.post(Pong(token=number, now_ns=0))
+        client.post(link.Pong(token=number, now_ns=0))
     assert client.expelled == ""
-    client.post(Pong(token=256, now_ns=0))
+    client.post(link.Pong(token=256, now_ns=0))
     assert client.expelled == "The client does not read its messages."
-    client.post(Event(name="bump", text="", at_ns=0))
+    client.post(link.Event(name="bump", text="", at_ns=0))
     assert len(list(iter(client.take, None))) == 257

@@ -20,16 +20,7 @@ from shapechanger.demos.episodes import (
     read_episode,
 )
 from shapechanger.robot.daemon.library import Answer, LineIndex, Question, RecordingLibrary
-from shapechanger.robot.link.messages import (
-    MAX_EPISODES,
-    MAX_PIECE,
-    Browse,
-    Fetch,
-    Judge,
-    Piece,
-    Recordings,
-    Refused,
-)
+from shapechanger.robot.link import messages as link
 from tests.robot.daemon.plans import ACTIONS, picture
 
 HEADER = EpisodeHeader(action_layout=ACTIONS, control_hz=10.0, driver="Ada")
@@ -65,7 +56,7 @@ def record(folder: Path, count: int, outcome: str = "") -> Path:
 
 
 def refusal(answer: Answer) -> str:
-    assert isinstance(answer, Refused)
+    assert isinstance(answer, link.Refused)
     return answer.reason
 
 
@@ -75,8 +66,8 @@ def test_the_pieces_reassemble_the_episode(ask: Ask, tmp_path: Path, count: int)
     lines, pictures = b"", []
     at, total = 0, 1
     while at < total:
-        piece = ask(Fetch(episode=path.name, first=at, count=count))
-        assert isinstance(piece, Piece)
+        piece = ask(link.Fetch(episode=path.name, first=at, count=count))
+        assert isinstance(piece, link.Piece)
         assert 1 <= len(piece.lines) <= count
         assert piece.header.encode() == (path / "episode.json").read_bytes()
         lines += "".join(f"{line}\n" for line in piece.lines).encode()
@@ -87,13 +78,13 @@ def test_the_pieces_reassemble_the_episode(ask: Ask, tmp_path: Path, count: int)
 
 
 def test_pieces_are_limited_in_size(ask: Ask, tmp_path: Path) -> None:
-    large = b"\xff\xd8" + bytes(MAX_PIECE)
+    large = b"\xff\xd8" + bytes(link.MAX_PIECE)
     with EpisodeWriter.create(tmp_path, HEADER) as writer:
         for jpeg in (picture(1), large, picture(2), b"\xff\xd8" + bytes(5 << 20)):
             writer.add(Step(action=(0.0, 0.0), driver="person"), jpeg)
     name = writer.path.name
-    pieces = [ask(Fetch(episode=name, first=first)) for first in range(4)]
-    assert [len(p.lines) for p in pieces if isinstance(p, Piece)] == [1, 1, 1]
+    pieces = [ask(link.Fetch(episode=name, first=first)) for first in range(4)]
+    assert [len(p.lines) for p in pieces if isinstance(p, link.Piece)] == [1, 1, 1]
     assert "too large" in refusal(pieces[3])
 
 
@@ -126,13 +117,13 @@ def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     first = record(tmp_path, 1)
     shutil.copytree(first, tmp_path / ".hidden")
-    for number in range(1, MAX_EPISODES + 3):
+    for number in range(1, link.MAX_EPISODES + 3):
         shutil.copytree(first, tmp_path / f"{first.name[:-4]}{number + 1:04d}")
     names = sorted((path.name for path in tmp_path.glob("2*")), reverse=True)
     before = ""
-    for expected in (names[:MAX_EPISODES], names[MAX_EPISODES:]):
-        found = ask(Browse(before=before))
-        assert isinstance(found, Recordings)
+    for expected in (names[: link.MAX_EPISODES], names[link.MAX_EPISODES :]):
+        found = ask(link.Browse(before=before))
+        assert isinstance(found, link.Recordings)
         assert [episode.id for episode in found.episodes] == expected
         assert found.more == (before == "")
         before = expected[-1]
@@ -142,9 +133,9 @@ def test_episodes_outside_the_folder_are_refused(ask: Ask, tmp_path: Path) -> No
     elsewhere = record(tmp_path / "elsewhere", 2)
     (tmp_path / "linked").symlink_to(elsewhere)
     for name in ("linked", "elsewhere", f"elsewhere/{elsewhere.name}", "..", ".", ""):
-        for question in (Fetch(episode=name), Judge(episode=name, first=0, last=0)):
+        for question in (link.Fetch(episode=name), link.Judge(episode=name, first=0, last=0)):
             assert "There is no episode" in refusal(ask(question))
-    assert ask(Browse()) == Recordings(episodes=())
+    assert ask(link.Browse()) == link.Recordings(episodes=())
     assert len(read_episode(elsewhere).kept) == 2
 
 
@@ -152,19 +143,19 @@ def test_damage_is_reported_and_the_rest_is_readable(ask: Ask, tmp_path: Path) -
     path = record(tmp_path, 4)
     with (path / "steps.jsonl").open("ab") as file:
         file.write(b'{"kind":"drop","first":0,"la')
-    piece = ask(Fetch(episode=path.name))
-    assert isinstance(piece, Piece)
+    piece = ask(link.Fetch(episode=path.name))
+    assert isinstance(piece, link.Piece)
     assert (piece.total, len(piece.lines)) == (5, 5)
     (path / "frames" / "000002.jpg").unlink()
-    assert "000002.jpg" in refusal(ask(Fetch(episode=path.name)))
+    assert "000002.jpg" in refusal(ask(link.Fetch(episode=path.name)))
     # A line must not refer to a file outside the episode.
     (tmp_path / "secret.jpg").write_bytes(b"secret")
     secret = '{"kind":"step","step":0,"frame":["../../secret.jpg",6,""]}\n'
     (path / "steps.jsonl").write_text(secret)
-    assert "damaged" in refusal(ask(Fetch(episode=path.name)))
+    assert "damaged" in refusal(ask(link.Fetch(episode=path.name)))
     (path / "episode.json").write_text("{")
-    found = ask(Browse())
-    assert isinstance(found, Recordings)
+    found = ask(link.Browse())
+    assert isinstance(found, link.Recordings)
     assert "cannot be read" in found.episodes[0].outcome
 
 

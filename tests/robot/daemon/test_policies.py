@@ -41,7 +41,6 @@ _NAMES = ("babble", "bad", "crash", "deaf", "student", "teacher")
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with policies and another file."""
     for name in _NAMES:
         (tmp_path / f"{name}.onnx").write_bytes(b"")
     (tmp_path / "readme.txt").write_text("")
@@ -50,7 +49,6 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def said() -> list[PolicyState]:
-    """The states that the policies have posted."""
     return []
 
 

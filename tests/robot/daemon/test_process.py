@@ -35,7 +35,6 @@ class Started:
     port: int = 0
 
     def ended(self) -> tuple[int, str]:
-        """Wait for the exit, and return the exit status and standard error."""
         assert self.process.stderr is not None
         with self.process.stderr as stderr:
             return self.process.wait(20.0), stderr.read().decode()
@@ -43,7 +42,6 @@ class Started:
 
 @pytest.fixture
 def begun(tmp_path: Path) -> Iterator[Started]:
-    """A daemon that has not received a state from the guard yet."""
     file = tmp_path / "ready.json"
     daemon = msgspec.to_builtins(car_plan(camera=None, discovery=True, ready_file=str(file)))
     guard_plan = GuardPlan("car", (ActionPlan("steering"), ActionPlan("throttle")), ())
@@ -76,7 +74,6 @@ def begun(tmp_path: Path) -> Iterator[Started]:
 
 @pytest.fixture
 def started(begun: Started) -> Started:
-    """A daemon that serves."""
     begun.guard.send(encode(guard_state()))
     while not begun.ready.exists():
         assert begun.heart.recv(16)  # The daemon lives.

@@ -53,7 +53,6 @@ class Recording:
             self._calls.get(timeout=WITHIN_S)()
 
     def end(self, outcome: str) -> list[Episode]:
-        """End the recording, and return its episodes."""
         self.recorder.end(outcome)
         episode = self.recorder._episode
         assert episode is not None
@@ -108,7 +107,6 @@ HUB = SessionHub(car_plan(), SteppedClock(), lambda order: None)
 
 
 def seen(seq: int, at_ns: int, **changes: Any) -> messages.Observation:
-    """Build an observation sent to a client with control."""
     fields = {"captured_ns": at_ns, "state": (float(at_ns),), "action_applied": (0.25,)}
     fields |= {"stop_reason": "", "mine": True} | changes
     return msgspec.structs.replace(HUB.observation(ADA, seq, None), **fields)

@@ -5,26 +5,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, read_episode
-from shapechanger.robot.link.messages import (
-    MAX_PIECE,
-    Browse,
-    Command,
-    Event,
-    Fetch,
-    Judge,
-    Mark,
-    Observation,
-    Piece,
-    Ping,
-    Pong,
-    Record,
-    RecorderState,
-    Recordings,
-    Refused,
-    Suggest,
-    Undo,
-    encode,
-)
+from shapechanger.robot.link import messages as link
 from tests.robot.daemon.plans import ACTIONS, picture
 from tests.robot.daemon.running import Client, Running, until
 
@@ -33,27 +14,27 @@ pytestmark = [pytest.mark.realtime, pytest.mark.plan(recordings="kept", arming="
 HEADER = EpisodeHeader(action_layout=ACTIONS)
 
 
-async def recording(client: Client, on: bool = True) -> RecorderState:
+async def recording(client: Client, on: bool = True) -> link.RecorderState:
     """Start or stop recording, and wait for the confirmation."""
-    await client.send(Record(on=on, name="corridor"))
+    await client.send(link.Record(on=on, name="corridor"))
     while True:
-        state = await client.expect(RecorderState)
+        state = await client.expect(link.RecorderState)
         if state.recording == on and state.episode:
             return state
 
 
-async def drive(robot: Running, client: Client, first: int, count: int) -> list[Observation]:
+async def drive(robot: Running, client: Client, first: int, count: int) -> list[link.Observation]:
     """Send `count` commands; each answers an observation with a new frame."""
-    seen: list[Observation] = []
+    seen: list[link.Observation] = []
     for seq in range(first, first + count):
         robot.show()
         await until(lambda: robot.daemon._hub.frame is not None, "there is an image")
         answered = await client.observe()
         seen.append(answered)
         await client.send(
-            Command(seq=seq, answers=answered.seq, values=(0.1, seq / 100), scale=0.5)
+            link.Command(seq=seq, answers=answered.seq, values=(0.1, seq / 100), scale=0.5)
         )
-        await client.expect(Observation)
+        await client.expect(link.Observation)
     return seen
 
 
@@ -75,12 +56,12 @@ async def test_a_step_pairs_an_observation_and_its_command(robot: Running, tmp_p
         seen = await drive(robot, program, 3, 9)
         await person.obtain()
         suggestion = await program.observe()
-        await program.send(Suggest(seq=9, answers=suggestion.seq, values=(-1.0, 5.0)))
-        assert (await program.expect(Observation)).suggested == (-1.0, 5.0)
+        await program.send(link.Suggest(seq=9, answers=suggestion.seq, values=(-1.0, 5.0)))
+        assert (await program.expect(link.Observation)).suggested == (-1.0, 5.0)
         seen += await drive(robot, person, 12, 1)
         assert (seen[-1].holder_role, seen[-1].mine) == ("person", True)
-        await person.send(Mark(text="a corner\n"))
-        while (state := await person.expect(RecorderState)).marks == 0:
+        await person.send(link.Mark(text="a corner\n"))
+        while (state := await person.expect(link.RecorderState)).marks == 0:
             pass
         assert state.steps == 10
         ended = await recording(person, on=False)
@@ -105,13 +86,19 @@ async def test_a_step_pairs_an_observation_and_its_command(robot: Running, tmp_p
 
 
 async def test_only_persons_record_and_judge(robot: Running, tmp_path: Path) -> None:
-    judge = Judge(episode="x", first=0, last=0)
+    judge = link.Judge(episode="x", first=0, last=0)
     async with robot.client() as program:
-        for request in (Record(on=True), Record(on=False), Mark(), Undo(), judge):
+        for request in (
+            link.Record(on=True),
+            link.Record(on=False),
+            link.Mark(),
+            link.Undo(),
+            judge,
+        ):
             await program.send(request)
-            assert "Only a person" in (await program.expect(Refused)).reason
-        await program.send(Browse())
-        assert (await program.expect(Recordings)) == Recordings(episodes=())
+            assert "Only a person" in (await program.expect(link.Refused)).reason
+        await program.send(link.Browse())
+        assert (await program.expect(link.Recordings)) == link.Recordings(episodes=())
     await robot.end()
     assert not (tmp_path / "kept").exists()
 
@@ -130,9 +117,9 @@ async def test_a_failing_disk_ends_the_recording_but_not_the_driving(
         while robot.daemon._hub.recorder.on:
             await drive(robot, person, seq, 1)
             seq += 1
-        states = [m for m in person.received if isinstance(m, RecorderState)]
+        states = [m for m in person.received if isinstance(m, link.RecorderState)]
         while not states[-1].text:
-            states.append(await person.expect(RecorderState))
+            states.append(await person.expect(link.RecorderState))
         assert "Cannot write" in states[-1].text
         assert not states[-1].recording
         assert (await person.drive(seq)).applied_seq == seq
@@ -150,14 +137,14 @@ async def test_recordings_cannot_share_a_folder_and_end_with_the_last_person(
     async with robot.client() as program:
         async with robot.client(role="person") as one, robot.client(role="person") as two:
             with EpisodeWriter.create(tmp_path / "kept", HEADER):
-                await one.send(Record(on=True))
-                assert "in use by another recorder" in (await one.expect(Refused)).reason
+                await one.send(link.Record(on=True))
+                assert "in use by another recorder" in (await one.expect(link.Refused)).reason
             await recording(one)
-            await two.send(Record(on=True))
-            assert "recorded already" in (await two.expect(Refused)).reason
+            await two.send(link.Record(on=True))
+            assert "recorded already" in (await two.expect(link.Refused)).reason
             async with robot.client(role="person") as late:
-                assert (await late.expect(RecorderState)).recording
-        while "last person" not in (state := await program.expect(RecorderState)).text:
+                assert (await late.expect(link.RecorderState)).recording
+        while "last person" not in (state := await program.expect(link.RecorderState)).text:
             pass
         assert not state.recording
     await robot.end()
@@ -171,12 +158,12 @@ async def test_requests_about_recordings_are_one_at_a_time(robot: Running, tmp_p
             writer.add(Step(action=(0.0, 0.5), driver="person"), picture(number))
     async with robot.client() as program:
         for _ in range(40):
-            await program.send(Fetch(episode=writer.path.name))
-        assert "one request" in (await program.expect(Refused)).reason
-        await program.send(Ping(token=1))
-        await program.expect(Pong)
-        pieces = [m for m in program.received if isinstance(m, Piece)]
-        assert all(0 < len(encode(piece)) < MAX_PIECE + 100_000 for piece in pieces)
+            await program.send(link.Fetch(episode=writer.path.name))
+        assert "one request" in (await program.expect(link.Refused)).reason
+        await program.send(link.Ping(token=1))
+        await program.expect(link.Pong)
+        pieces = [m for m in program.received if isinstance(m, link.Piece)]
+        assert all(0 < len(link.encode(piece)) < link.MAX_PIECE + 100_000 for piece in pieces)
         assert len(pieces) < 40
 
 
@@ -185,6 +172,6 @@ async def test_a_client_that_only_listens_gets_all_events(robot: Running, key: b
     async with robot.client(key) as program:
         for number in range(6):
             robot.daemon._hub.event("news", str(number))
-            while (received := await program.expect(Event)).name != "news":
+            while (received := await program.expect(link.Event)).name != "news":
                 pass
             assert received.text == str(number)

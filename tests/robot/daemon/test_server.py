@@ -9,18 +9,7 @@ import pytest
 
 from shapechanger.robot.daemon import session
 from shapechanger.robot.daemon.server import origin_refusal
-from shapechanger.robot.link.messages import (
-    MAX_CLIENT_MESSAGE,
-    VERSION,
-    Acknowledge,
-    Challenge,
-    Command,
-    EmergencyStop,
-    Event,
-    Hello,
-    Refused,
-    Release,
-)
+from shapechanger.robot.link import messages as link
 from tests.robot.daemon.running import Client, Running, until
 
 pytestmark = pytest.mark.realtime
@@ -36,7 +25,7 @@ async def test_a_wrong_key_is_refused_after_a_pause(
     for _ in range(3):
         async with robot.connect() as client:
             began = loop.time()
-            await client.send(Hello(version=VERSION, proof=b"w" * 32))
+            await client.send(link.Hello(version=link.VERSION, proof=b"w" * 32))
             assert "Wrong key" in await client.closed_with()
             assert loop.time() - began >= 0.05
     async with robot.connect() as client:
@@ -56,7 +45,10 @@ async def _flood(send: Callable[[Client], Awaitable[None]], client: Client) -> N
     ("misbehave", "text"),
     [
         (lambda client: client.socket.send_bytes(b"\xc1\xff\x00"), "Not a valid message"),
-        (lambda client: client.socket.send_bytes(bytes(MAX_CLIENT_MESSAGE + 1)), "than the 65536"),
+        (
+            lambda client: client.socket.send_bytes(bytes(link.MAX_CLIENT_MESSAGE + 1)),
+            "than the 65536",
+        ),
         (partial(_flood, lambda client: client.socket.ping(b"x")), "500 per second"),
         (partial(_flood, lambda client: client.socket.pong(b"x")), "500 per second"),
     ],
@@ -85,7 +77,7 @@ async def test_a_client_without_a_hello_is_disconnected(
 async def test_connections_are_limited_before_authentication(robot: Running) -> None:
     async with contextlib.AsyncExitStack() as stack:
         clients = [await stack.enter_async_context(robot.connect()) for _ in range(17)]
-        await clients[0].expect(Challenge)
+        await clients[0].expect(link.Challenge)
         assert await clients[0].receive() is None  # Displaced by the 17th connection.
         await clients[1].greet()
 
@@ -95,7 +87,7 @@ async def test_a_disconnection_disarms_the_robot(robot: Running, how: str) -> No
     async with robot.client(role="person", name="Ann") as client:
         await robot.armed(client)
         if how == "release":
-            await client.send(Release())
+            await client.send(link.Release())
         elif how == "close":
             await client.socket.close()
         else:
@@ -108,14 +100,14 @@ async def test_an_emergency_stop_is_reported_to_all(robot: Running) -> None:
     """All clients get stops and refusals of the guard; a person who has seen a stop can end it."""
     async with robot.client(role="person") as ann, robot.client(name="sac") as sac:
         await robot.armed(ann)
-        await sac.send(EmergencyStop(reason="a cat"))
-        while (event := await ann.expect(Event)).name != "emergency":
+        await sac.send(link.EmergencyStop(reason="a cat"))
+        while (event := await ann.expect(link.Event)).name != "emergency":
             pass
         assert event.text == "Emergency stop: sac: a cat"
         seen = await ann.observe()
         assert (seen.emergency, seen.emergencies, seen.armed) == (True, 1, False)
-        await ann.send(Command(seq=1, answers=seen.seq, values=(0.0, 0.5)))
-        refused = await ann.expect(Refused)
+        await ann.send(link.Command(seq=1, answers=seen.seq, values=(0.0, 0.5)))
+        refused = await ann.expect(link.Refused)
         assert ("Emergency stop" in refused.reason, refused.seq) == (True, 1)
         await robot.arm(ann, emergency=1)
         await until(lambda: robot.guard.state.armed, "it is armed again")
@@ -136,7 +128,7 @@ async def test_a_client_that_does_not_read_is_dropped(
         async def keep_asking() -> None:
             while True:
                 robot.show()
-                await slow.send(Acknowledge())
+                await slow.send(link.Acknowledge())
                 await asyncio.sleep(0.004)
 
         asking = asyncio.create_task(keep_asking())

@@ -23,24 +23,7 @@ from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.session import Session
 from shapechanger.robot.guard.channel import Order
-from shapechanger.robot.link.messages import (
-    VERSION,
-    Arm,
-    Browse,
-    Command,
-    Disarm,
-    EmergencyStop,
-    Fetch,
-    Hello,
-    Judge,
-    Mark,
-    Record,
-    Release,
-    Suggest,
-    Take,
-    Undo,
-    encode,
-)
+from shapechanger.robot.link import messages as link
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, guard_state
 
@@ -66,13 +49,13 @@ class Connected:
         self.role = role
         self.is_person = role == "person"
         self.sent: dict[int, int] = {}
-        self.newest = {Command: -1, Suggest: -1}
+        self.newest = {link.Command: -1, link.Suggest: -1}
 
     def answers(self, back: int) -> int:
         """Return the number of the observation `back` before the last one that was sent."""
         return max(0, max(self.sent, default=0) - back)
 
-    def number(self, kind: type[Command | Suggest], ahead: int) -> tuple[int, bool]:
+    def number(self, kind: type[link.Command | link.Suggest], ahead: int) -> tuple[int, bool]:
         """Return the largest number so far plus `ahead`, and whether the sum is larger than it."""
         newest, number = self.newest[kind], max(0, self.newest[kind] + ahead)
         self.newest[kind] = max(newest, number)
@@ -106,7 +89,7 @@ class Robot(RuleBasedStateMachine):
         self.here += 1
         self.numbers += 1
         session = Session(self.numbers, self.hub, Authenticator())
-        session.introduce(encode(Hello(version=VERSION, proof=b"", role=role)))
+        session.introduce(link.encode(link.Hello(version=link.VERSION, proof=b"", role=role)))
         client = Connected(session, role)
         self.observe(client)
         return client
@@ -126,9 +109,8 @@ class Robot(RuleBasedStateMachine):
 
     @rule(client=clients)
     def take(self, client: Connected) -> None:
-        """A client asks for control."""
         held = self.holder
-        self.send(client, Take())
+        self.send(client, link.Take())
         if held is None or (client.is_person and not held.is_person) or held is client:
             self.forget_suggestion(client)
             if held not in (None, client):
@@ -138,8 +120,7 @@ class Robot(RuleBasedStateMachine):
 
     @rule(client=clients)
     def release(self, client: Connected) -> None:
-        """A client releases control, whether or not it has control."""
-        self.send(client, Release())
+        self.send(client, link.Release())
         self.lose_control(client)
 
     @rule(client=clients, by_holder=st.booleans(), emergency=st.integers(0, 2), back=_backs)
@@ -150,7 +131,7 @@ class Robot(RuleBasedStateMachine):
         """
         client = self.actor(client, by_holder)
         answers = client.answers(back)
-        orders = self.send(client, Arm(answers=answers, emergency=emergency))
+        orders = self.send(client, link.Arm(answers=answers, emergency=emergency))
         program = self.anyone_arms and not self.emergency and self.holder is client
         may = self.holder is not None and (client.is_person or program)
         arms = may and self.is_fresh(client, answers)
@@ -159,14 +140,14 @@ class Robot(RuleBasedStateMachine):
 
     @rule(client=clients)
     def stop(self, client: Connected) -> None:
-        (order,) = self.send(client, EmergencyStop(reason="a\x1b[2Jcat"))
+        (order,) = self.send(client, link.EmergencyStop(reason="a\x1b[2Jcat"))
         reason = f"{client.session.client.name}: a [2Jcat"
         assert (order.kind, order.reason) == ("emergency", reason)
 
     @rule(client=clients)
     def disarm(self, client: Connected) -> None:
         """A person can disarm the robot, and so can the client in control."""
-        orders = self.send(client, Disarm())
+        orders = self.send(client, link.Disarm())
         may = client.is_person or self.holder is client
         assert [order.kind for order in orders] == (["disarm"] if may else [])
 
@@ -202,8 +183,8 @@ class Robot(RuleBasedStateMachine):
         if by_holder:
             ahead, back, values = 1, 0, (0.5, -1.0)
         client = self.actor(client, by_holder)
-        answers, (seq, is_new) = client.answers(back), client.number(Command, ahead)
-        message = Command(seq=seq, answers=answers, values=values, scale=scale, ttl_ms=ttl_ms)
+        answers, (seq, is_new) = client.answers(back), client.number(link.Command, ahead)
+        message = link.Command(seq=seq, answers=answers, values=values, scale=scale, ttl_ms=ttl_ms)
         orders = self.send(client, message)
         if self.holder is not client or not is_new:
             assert not orders
@@ -221,8 +202,8 @@ class Robot(RuleBasedStateMachine):
     def suggest(self, client: Connected, ahead: int, back: int, values: tuple[float, ...]) -> None:
         """A suggestion counts if its sender does not have control; it never moves the robot."""
         self.observe(client)
-        answers, (seq, is_new) = client.answers(back), client.number(Suggest, ahead)
-        assert not self.send(client, Suggest(seq=seq, answers=answers, values=values))
+        answers, (seq, is_new) = client.answers(back), client.number(link.Suggest, ahead)
+        assert not self.send(client, link.Suggest(seq=seq, answers=answers, values=values))
         counts = self.holder is not client and is_new and self.is_good(values)
         if counts and self.is_fresh(client, answers):
             name = client.session.client.name
@@ -232,9 +213,15 @@ class Robot(RuleBasedStateMachine):
         client=clients,
         request=st.sampled_from(
             (
-                *(Record(on=True), Record(on=False), Mark(text="here"), Undo(), Browse()),
-                Fetch(episode="20260101T000000Z-0001"),
-                Judge(episode="20260101T000000Z-0001", first=0, last=3),
+                *(
+                    link.Record(on=True),
+                    link.Record(on=False),
+                    link.Mark(text="here"),
+                    link.Undo(),
+                    link.Browse(),
+                ),
+                link.Fetch(episode="20260101T000000Z-0001"),
+                link.Judge(episode="20260101T000000Z-0001", first=0, last=3),
             )
         ),
     )
@@ -249,7 +236,6 @@ class Robot(RuleBasedStateMachine):
 
     @rule(emergency=st.booleans())
     def report(self, emergency: bool) -> None:
-        """A state of the guard and a frame arrive."""
         self.emergency = emergency
         self.hub.on_state(guard_state(at_ns=self.clock.ns, armed=True, emergency=emergency))
         self.hub.on_frame(Frame(b"jpeg", self.clock.ns))
@@ -315,7 +301,7 @@ class Robot(RuleBasedStateMachine):
     def send(self, client: Connected, message: Any) -> list[Order]:
         """Send a message from a client, and return the orders that it caused."""
         before = len(self.orders)
-        client.session.receive(encode(message))
+        client.session.receive(link.encode(message))
         return self.orders[before:]
 
 

@@ -18,23 +18,17 @@ MS = 1_000_000
 
 
 class Fault:
-    """Makes one armed operation on the hardware fail.
-
-    Attributes:
-        happened: Whether the operation was reached and failed.
-    """
+    """Makes one armed operation on the hardware fail."""
 
     def __init__(self) -> None:
         self._left = 0
         self._takes_effect = False
-        self.happened = False
+        self.happened = False  # Whether the operation was reached and failed.
 
     def arm(self, operation: int, takes_effect: bool) -> None:
-        """Make the given operation fail.
+        """Make operation number `operation`, from 1, fail.
 
-        Args:
-            operation: Number of the operation, from 1.
-            takes_effect: Whether it still takes effect, as with a late acknowledgement of a chip.
+        It may still take effect, as with a late acknowledgement of a chip.
         """
         self._left, self._takes_effect, self.happened = operation, takes_effect, False
 
@@ -115,11 +109,7 @@ class FakeBus:
 
 
 class FakeHardware:
-    """All fake hardware of a robot.
-
-    Attributes:
-        fault: Makes an operation on a pin, a chip or a pulse fail.
-    """
+    """All fake hardware of a robot."""
 
     def __init__(self, chips: dict[int, dict[int, int]] | None = None) -> None:
         self.clock = Clock()
@@ -134,7 +124,6 @@ class FakeHardware:
         return self.bus
 
     def servo_port(self, settings: BusSettings, open_port: object) -> ServoPort:
-        """Raise, since servo buses are simulated elsewhere."""
         raise RobotError(f"The bus at {settings.device} cannot be opened.")
 
     def close(self) -> None:

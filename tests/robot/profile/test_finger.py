@@ -2,13 +2,11 @@
 
 import math
 import re
-from pathlib import Path
 
 import pytest
 
 from shapechanger.errors import ProfileError
-from shapechanger.robot.profile import load_profile, shipped_profiles, write_profile
-from shapechanger.robot.profile.load import rewrite
+from shapechanger.robot.profile import load_profile, shipped_profiles
 from tests.robot.profile.texts import changed, finger_text, read
 
 _TEXT = shipped_profiles()["finger"].read_text()
@@ -88,15 +86,6 @@ def test_a_feetech_rig_has_the_settings_of_its_power_switch() -> None:
     assert profile.action_layout()["FDP"].gain == pytest.approx(0.042)
 
 
-def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
-    """`rewrite` sets the zero as `robot home` does, and keeps comments."""
-    path = write_profile("finger", tmp_path / "mine.toml", "mine")
-    profile = rewrite(path, {"sensor.joints.PIP_flexion.zero": 1234})
-    rows = profile.sensors[-1].settings["rows"]
-    assert [row["zero"] for row in rows.values()] == [0, 0, 1234, 0]
-    assert "# Counts while the finger is straight." in path.read_text()
-
-
 # First occurrence to replace in the finger's profile, its replacement, and part of the message.
 _TABLE = r"""
 channel = 3\n -> channel = 2\n -> has the channel 2, which PIP_flexion has, too
@@ -107,15 +96,11 @@ mux = 0x70 -> mux = 0x68 -> from 112 to 119
 direction = 1 -> direction = 0 -> must be one of -1, 1, not 0
 then = "release" -> then = "hold" -> must be "release"
 \nid = 2\n -> \nid = 1\n -> id 1 of the servo bus is used twice: by id of [output.FDP]
-pretension_n = 1.0 -> pretension_n = 30.0 -> pretension_n of [output.FDP] must be
 watchdog_ms = 100 -> watchdog_ms = 90 -> in steps of 20 from 20 to 2540, not 90
-id = 1\n -> id = 1\ncontrol = "length"\n -> must be below longest_m, not 0 and 0 m
 """
 _FEETECH = r"""
-control = "length" -> control = "tension" -> must be 'length', not 'tension', because a
 shortest_m = -0.03  -> shortest_m = -0.04  -> within 0.0314 m of the zero, half a turn
 [enable]\npin = 19 ->  -> [output.FDP] is an STS3215, which does not stop when its bus is
-baud = 1_000_000 -> baud = 2_000_000 -> baud of [servo_bus] must be one that the servos have
 model = "STS3215" -> model = "XL330-M077" -> cannot have Dynamixel and Feetech servos
 """
 _MISTAKES = [

@@ -11,7 +11,6 @@ from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.link.messages import ClientMessage, RobotMessage
 from shapechanger.robot.profile import shipped_profiles
 from shapechanger.robot.profile.read import TABLES
-from tests.robot.profile.texts import read
 
 DOCS = Path(__file__).parents[3] / "docs"
 SOURCE = (DOCS / "profiles.md").read_text()
@@ -20,11 +19,6 @@ SOURCE = (DOCS / "profiles.md").read_text()
 @pytest.fixture(scope="module", name="guide")
 def _guide() -> str:
     return with_keys(SOURCE)
-
-
-def test_vehicle_of_the_guide_is_a_profile() -> None:
-    (text,) = re.findall(r"```toml\n(\[robot\].*?)```", SOURCE, re.DOTALL)
-    assert read(text).body == "hovercraft"
 
 
 def test_every_key_of_a_profile_has_a_meaning(guide: str) -> None:

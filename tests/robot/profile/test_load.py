@@ -76,7 +76,6 @@ def test_unreadable_files_are_refused(tmp_path: Path) -> None:
 
 @pytest.fixture
 def rover(tmp_path: Path) -> Path:
-    """The file of a profile with every table."""
     path = tmp_path / "rover.toml"
     path.write_text(EVERYTHING)
     return path

@@ -24,7 +24,6 @@ body = "car" -> body = { a = 1 } -> can be printed, not {'a': 1}
 name = "rover" -> name = "a\u0007" -> can be printed, not 'a\x07'
 name = "rover"\n ->  -> [robot] lacks the key 'name', a text of 1 to 64 characters -> [robot]
 control_hz = 25 -> control_hz = "25 Hz" -> a number from 1 to 100, not '25 Hz'
-control_hz = 25 -> control_hz = nan -> from 1 to 100, not nan
 2026-11-03 -> 2026-11-03T12:00:00 -> must be a date, such as 2026-11-03, not
 levels = "three" -> levels = "thre" -> one of 'any', 'three', not 'thre' (did you mean 'three'?)
 seconds = 0.5 -> seconds = true -> seconds of [[reset]] number 2 must be a number above
@@ -52,7 +51,6 @@ low = -0.5 -> one_sided = true\nlow = -0.5 -> must be 0 to 1, because it is one-
 rest = 0.25 -> rest = 0.25\nhigh = 0.2 -> rest of [action.arm] must lie between low and
 low = -0.5 -> rest = 0.1 -> rest of [action.throttle] must be 0, because it propels
 slew_per_s = 2 -> slew_down_per_s = 2 -> must be left out, because it propels: a stop is immediate
-slew_per_s = 2 -> slew_per_s = 0 -> must be a number above 0, not 0
 unit = "deg"\n ->  -> gain of [action.arm] needs a unit, such as unit = 'deg' -> gain = 90
 [action.arm] -> [action."left arm"] -> the name 'left arm' must begin with a letter
 mix = { arm = 1.0 } -> mix = {} -> is empty, so nothing moves it; there are: steering, th
@@ -64,14 +62,12 @@ enable = 26 -> offset = -0.1 -> is at -0.1 when its actions rest, and must be at
 right_us = 1000 -> right_us = 1500 -> must lie between left_us -> [output.steer]
 over = "sysfs" -> over = "sysfs"\nhz = 400\nforward_us = 2500 -> no time for a pulse of -> hz = 400
 start = 0.1 -> start = 0.5\nfull = 0.5 -> start of [output.brush] must be below full
-deadline_ms = 200 -> deadline_ms = 1001 -> from 20 to 1000, not 1001
 deadline_ms = 200 -> deadline_ms = 39 -> must be at least 40 ms, the time from one command
 deadline_ms = 200 -> camera_stale_ms = 0 -> must be at least 100 ms
 flip = true -> fps = 3 -> camera_stale_ms of [limits] must be at least 667 ms -> [limits]
 throttle = -0.4 -> throttle = -0.6 -> must be -0.5 to 1 for throttle
 throttle = -0.4 -> thrott = -0.4 -> no action: 'thrott' (did you mean
 arm = 0.5\n -> arm = 2\n -> [[reset]] number 2 must be a table of numbers -> [reset.values]
-hold_ms = 50 -> hold_ms = 10 -> must be a whole number from 30 to 1000
 name = "rover" -> name = "rover -> this is not valid TOML: illegal character
 [stop] -> [limits] -> this is not valid TOML: cannot declare ('limits',) twice at column 8
 """

@@ -10,10 +10,10 @@ from gpiozero.pins.data import PLUS_J8
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, StopPlan
+from shapechanger.contract.plan import ActionPlan, LimitPlan, StopPlan
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.drivers.pins import BCM_OF_BOARD, bcm
+from shapechanger.robot.drivers.pins import BCM_OF_BOARD
 from shapechanger.robot.profile import load_profile, shipped_profiles
 from shapechanger.robot.profile.toml import Place, line_of
 from tests.robot.profile.texts import EVERYTHING, changed, read
@@ -39,6 +39,7 @@ def test_everything_is_read() -> None:
         high_temperature_c=80.0,
     )
     assert (profile.max_observation_age_ms, profile.arming) == (400, "anyone")
+    assert (profile.enable_pin, profile.enable_hold_ms, profile.stop_pin) == (19, 50, 21)
     assert profile.stop == StopPlan(then="release")
     assert profile.reward == {
         "velocity": 2.0,
@@ -75,12 +76,6 @@ def test_outputs_and_sensors_have_all_settings_of_their_drivers() -> None:
     sensors = {sensor.name: (sensor.measures, sensor.settings) for sensor in read().sensors}
     assert sensors["bumper"] == ("bump", {"pins": [12, 13], "pull": "up"})
     assert sensors["wheel"][1] == {"a": 16, "b": 20, "counts_per_turn": 20.0, "wheel_m": 0.21}
-
-
-def test_guard_plan_round_trips() -> None:
-    plan = read().guard_plan()
-    assert GuardPlan.from_json(plan.to_json()) == plan
-    assert (plan.enable_pin, plan.enable_hold_ms, plan.stop_pin) == (19, 50, 21)
 
 
 def test_layouts_name_every_number() -> None:
@@ -145,11 +140,6 @@ def test_the_header_matches_gpiozero() -> None:
     pins: dict[int, dict[str, str]] = PLUS_J8[2]
     named = {n: int(p["gpio"].removeprefix("GPIO")) for n, p in pins.items() if "gpio" in p}
     assert named == BCM_OF_BOARD
-
-
-def test_the_pins_of_the_original_release_are_parsed() -> None:
-    assert [bcm(f"BOARD{n}") for n in (15, 13, 11, 7)] == [22, 27, 17, 4]
-    assert bcm("GPIO22") == bcm(22) == 22
 
 
 VALUES = st.sampled_from(

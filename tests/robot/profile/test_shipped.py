@@ -30,7 +30,6 @@ def test_every_body_has_a_profile() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_drives_at_rest(name: str) -> None:
-    """At rest every motor is at 0 and the steering is straight."""
     plan = PLANS[name]
     at_rest = values(plan, [action.rest for action in plan.actions])
     propelling = {action.name for action in plan.actions if action.propels}
@@ -87,6 +86,7 @@ def test_tendons_pull_one_to_one(pull: list[float]) -> None:
 
 def test_a_profile_alone_can_define_a_vehicle() -> None:
     profile = read(HOVERCRAFT)
+    assert profile.body == "hovercraft"
     plan = profile.guard_plan()
     assert profile.action_layout().names == ("steering", "throttle", "lift")
     assert list(profile.action_layout().low) == [-1.0, -1.0, 0.0]

@@ -157,11 +157,7 @@ _LENGTH = 'control = "length"\nlongest_m = 0.012\nshortest_m = -0.03\n'
 
 
 def finger_text(family: str) -> str:
-    """Return the shipped finger with control of the lengths.
-
-    Args:
-        family: "Dynamixel", or "Feetech" with the lines of the guide that differ.
-    """
+    """Return the shipped finger with control of the lengths, and Feetech servos as in the guide."""
     text = shipped_profiles()["finger"].read_text()
     lines, enable = _LENGTH, ""
     if family == "Feetech":

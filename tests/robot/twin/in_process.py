@@ -54,18 +54,12 @@ class _Clock(SteadyClock):
 
 
 class LocalBoard(BoardClient):
-    """A board with its world in this process; only `advance` advances its time.
-
-    It serves only this process, and is also its clock.
-
-    Attributes:
-        t: Time, ns.
-    """
+    """A board with its world in this process, whose time only `advance` advances."""
 
     clock = "twin"
 
     def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
-        self.t = START_NS
+        self.t = START_NS  # Time, ns.
         self.pid = os.getpid()
         self.pins = PinBoard(wiring, world, None, seed, lambda: self.t)
         self.levels: dict[int, int] = {}
@@ -79,7 +73,6 @@ class LocalBoard(BoardClient):
         return self._closed
 
     def advance(self, now_ns: int) -> None:
-        """Advance time, the world and the sensors."""
         self.t = now_ns
         for t, pin, level in self.pins.advance(now_ns):
             if pin in self.levels:
@@ -88,7 +81,6 @@ class LocalBoard(BoardClient):
                     self.watchers[pin](level, t)
 
     def wait_until(self, until_ns: int) -> bool:
-        """Raise an error, because only the caller could advance the board."""
         raise RobotError("The time of a board in this process advances only by `advance`.")
 
     def pass_ns(self, ns: int) -> None:
@@ -98,7 +90,6 @@ class LocalBoard(BoardClient):
         self.ask(None, function, *arguments)
 
     def ask(self, kind: Any, function: str, *arguments: Any) -> Any:
-        """Call a function of the board and return its result."""
         called = getattr(self.pins, function)
         takes_caller = "caller" in signature(called).parameters
         return called(self, *arguments) if takes_caller else called(*arguments)
@@ -118,7 +109,6 @@ class _Orders:
         self.refused = ""
 
     def filenos(self) -> list[int]:
-        """Return no descriptors, because orders do not arrive through any."""
         return []
 
     def orders(self) -> tuple[list[Order], list[str]]:
@@ -126,7 +116,6 @@ class _Orders:
         return orders, []
 
     def send(self, state: GuardState) -> bool:
-        """Store the newest state."""
         self.state = state
         self.refused = state.refused or self.refused
         return True
@@ -172,8 +161,7 @@ class InProcessRobot:
     def start(self, place: Callable[[], object] | None = None) -> Observation:
         """Restart the robot, arm it, and return the first observation.
 
-        Args:
-            place: Function that places the vehicle, before and after arming; None to leave it.
+        `place` places the vehicle, before and after arming.
         """
         if place is not None:
             place()  # Otherwise a moving vehicle would roll on while the robot starts.
@@ -191,11 +179,7 @@ class InProcessRobot:
     def step(self, values: Sequence[float]) -> tuple[Observation, bool]:
         """Send a command, and advance one control period.
 
-        Args:
-            values: One value for each action.
-
-        Returns:
-            The observation at the end of the period, and whether the robot bumped into something.
+        Return the observation at its end, and whether the robot bumped into something.
         """
         bumps = self._orders.state.bumps
         self._seq += 1

@@ -30,7 +30,6 @@ def servo(
 def esc(
     name: str, part: str, mix: dict[str, float], **over: bool | int | float | str
 ) -> OutputPlan:
-    """A speed controller from 1000 to 2000 us."""
     settings = {"hz": 50, "backward_us": 1000, "neutral_us": 1500, "forward_us": 2000}
     more = {"arm_s": 0.5, "reverse": "double", "brake_ms": 100}
     return OutputPlan(name, "esc", part, mix, 0.0, {**settings, **more, **over})

@@ -15,24 +15,15 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.simulation import Edge
 from shapechanger.robot.twin import rpc
 from shapechanger.robot.twin.hardware import GrantedClock, SteadyClock
-from shapechanger.robot.twin.rpc import (
-    MAX_MESSAGE,
-    Awake,
-    BoardClient,
-    BoardConnection,
-    Greeting,
-    Reply,
-    encode,
-)
 
 pytestmark = pytest.mark.realtime  # The tests open sockets.
 
 
 def _reply(number: int, result: object) -> bytes:
-    return encode(Reply(number, msgspec.Raw(encode(result))))
+    return rpc.encode(rpc.Reply(number, msgspec.Raw(rpc.encode(result))))
 
 
-def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
+def _connected(folder: Path) -> tuple[rpc.BoardClient, socket.socket]:
     """Return a client, and the board's end of its connection, which is not read."""
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     path = str(folder / "board.socket")
@@ -42,14 +33,14 @@ def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
 
     def greet() -> None:
         end, _ = listening.accept()
-        end.recv(MAX_MESSAGE)
-        end.send(_reply(1, Greeting(clock="real", t=0)))
+        end.recv(rpc.MAX_MESSAGE)
+        end.send(_reply(1, rpc.Greeting(clock="real", t=0)))
         ends.append(end)
 
     with listening:
         board = threading.Thread(target=greet)
         board.start()
-        client = BoardClient(path, "hardware")
+        client = rpc.BoardClient(path, "hardware")
         board.join()
     return client, ends[0]
 
@@ -73,7 +64,6 @@ def test_heartbeats_are_sent_while_a_reply_is_late(tmp_path: Path, clock: str) -
 
 
 def test_a_request_waits_while_the_socket_is_full(tmp_path: Path) -> None:
-    """The request is sent when the board reads."""
     client, board = _connected(tmp_path)
     beats: list[int] = []
 
@@ -82,7 +72,7 @@ def test_a_request_waits_while_the_socket_is_full(tmp_path: Path) -> None:
         if len(beats) == 3:
             with contextlib.suppress(BlockingIOError):
                 while True:
-                    board.recv(MAX_MESSAGE, socket.MSG_DONTWAIT)
+                    board.recv(rpc.MAX_MESSAGE, socket.MSG_DONTWAIT)
 
     client.while_held_up = beat
     with board:
@@ -114,15 +104,15 @@ def test_the_last_edge_of_each_input_is_kept(pins: list[int]) -> None:
     own, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     edges = [Edge(t, pin, t % 2) for t, pin in enumerate(pins)]
     with own, theirs:
-        board = BoardConnection(own)
+        board = rpc.BoardConnection(own)
         for edge in edges:
             board.add_edge(edge)
         board.waits = 7
         board.wake(9, always=True)
         board.wake(10, always=True)  # No effect, because the client no longer waits.
-        reply = msgspec.msgpack.decode(theirs.recv(MAX_MESSAGE), type=Reply)
+        reply = msgspec.msgpack.decode(theirs.recv(rpc.MAX_MESSAGE), type=rpc.Reply)
         assert reply.id == 7
-        awake: Awake = reply.decode(Awake)
+        awake: rpc.Awake = reply.decode(rpc.Awake)
     got = awake.edges
     assert got == sorted(set(edges) & set(got))
     assert got == edges or len(edges) > 500

@@ -23,7 +23,6 @@ _PULL = (0.5, *(0.0,) * 6)
 
 @pytest.fixture(scope="module")
 def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BoardAt]:
-    """The board of a finger, on the twin's clock."""
     place = finger_place(NOMINAL)
     with start_board(_PLAN, "twin", tmp_path_factory.mktemp("board"), place=place) as started:
         yield started
@@ -31,7 +30,6 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BoardAt]:
 
 @pytest.fixture
 def hardware(board: BoardAt) -> Iterator[TwinHardware]:
-    """Hardware of a guard that is connected to the board."""
     made = connect(board.socket_path)
     yield made
     made.close()

@@ -41,7 +41,6 @@ class _Rig:
         self.seen: dict[str, float] = {}
 
     def advance(self, seconds: float) -> dict[str, float]:
-        """Advance the clock, deliver edges and read the sensor."""
         for _ in range(round(seconds * 100)):
             self.board.pass_ns(10_000_000)
             self.seen |= self.sensor.read(self.board.t, self.motor.value)

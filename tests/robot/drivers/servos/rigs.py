@@ -145,7 +145,6 @@ class Rig(FakeHardware):
         return self.line.servos[NAMES.index(name) + 1]
 
     def prepare(self) -> Rig:
-        """Set up and hold the bus, without zeros."""
         self.bus.set_up()
         self.bus.hold()
         return self

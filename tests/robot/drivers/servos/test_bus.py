@@ -117,6 +117,9 @@ def test_a_stop_ramps_down_and_releases() -> None:
     rig.run(5.0, 20)
     assert rig.bus.reason == ""
     assert min(rig.pulls()) > 0.1
+    rig.bus.close()
+    assert not any(one.has_torque for one in rig.line.servos.values())
+    assert rig.port.is_closed
 
 
 @pytest.mark.parametrize(("ramp_ms", "pulled"), [(0, True), (300, False)])
@@ -151,14 +154,6 @@ def test_flush_sends_only_while_held() -> None:
     rig.bus.flush(grip=False)
     rig.run(None)
     assert "is gone" in rig.bus.reason
-
-
-def test_close_leaves_no_torque() -> None:
-    rig = Rig().start()
-    rig.run(5.0, 5)
-    rig.bus.close()
-    assert not any(one.has_torque for one in rig.line.servos.values())
-    assert rig.port.is_closed
 
 
 def _rig(direction: int = 1) -> Rig:
