@@ -10,20 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import (
-    Drop,
-    EpisodeHeader,
-    EpisodeWriter,
-    Keep,
-    Step,
-    edit,
-    read_episode,
-)
+from shapechanger.demos import episodes
 from shapechanger.robot.daemon.library import Answer, LineIndex, Question, RecordingLibrary
 from shapechanger.robot.link import messages as link
 from tests.robot.daemon.plans import ACTIONS, picture
 
-HEADER = EpisodeHeader(action_layout=ACTIONS, control_hz=10.0, driver="Ada")
+HEADER = episodes.EpisodeHeader(action_layout=ACTIONS, control_hz=10.0, driver="Ada")
 Ask = Callable[[Question], Answer]
 
 
@@ -45,10 +37,10 @@ def ask(tmp_path: Path) -> Iterator[Ask]:
 
 def record(folder: Path, count: int, outcome: str = "") -> Path:
     """Record an episode with a new frame at every second step, and a mark."""
-    with EpisodeWriter.create(folder, HEADER) as writer:
+    with episodes.EpisodeWriter.create(folder, HEADER) as writer:
         for number in range(count):
             jpeg = picture(number) if number % 2 == 0 else None
-            writer.add(Step(action=(0.0, number / count), driver="person"), jpeg)
+            writer.add(episodes.Step(action=(0.0, number / count), driver="person"), jpeg)
             if number == 1:
                 writer.mark("é ☃")
         writer.close(outcome)
@@ -79,9 +71,9 @@ def test_the_pieces_reassemble_the_episode(ask: Ask, tmp_path: Path, count: int)
 
 def test_pieces_are_limited_in_size(ask: Ask, tmp_path: Path) -> None:
     large = b"\xff\xd8" + bytes(link.MAX_PIECE)
-    with EpisodeWriter.create(tmp_path, HEADER) as writer:
+    with episodes.EpisodeWriter.create(tmp_path, HEADER) as writer:
         for jpeg in (picture(1), large, picture(2), b"\xff\xd8" + bytes(5 << 20)):
-            writer.add(Step(action=(0.0, 0.0), driver="person"), jpeg)
+            writer.add(episodes.Step(action=(0.0, 0.0), driver="person"), jpeg)
     name = writer.path.name
     pieces = [ask(link.Fetch(episode=name, first=first)) for first in range(4)]
     assert [len(p.lines) for p in pieces if isinstance(p, link.Piece)] == [1, 1, 1]
@@ -104,8 +96,8 @@ def test_a_summary_agrees_with_the_whole_episode(
     for good, one, other in [(True, 0, 0), *judgements]:
         first, last = sorted((one, other))
         if last < count:
-            edit(path, (Keep if good else Drop)(first, last, "bad"))
-        episode, summary = read_episode(path), recordings.summary(path.name)
+            episodes.edit(path, (episodes.Keep if good else episodes.Drop)(first, last, "bad"))
+        episode, summary = episodes.read_episode(path), recordings.summary(path.name)
         assert (summary.steps, summary.kept) == (len(episode.steps), len(episode.kept))
         assert summary.seconds == episode.seconds
         assert (summary.closed, summary.outcome) == (episode.closed, episode.outcome)
@@ -136,7 +128,7 @@ def test_episodes_outside_the_folder_are_refused(ask: Ask, tmp_path: Path) -> No
         for question in (link.Fetch(episode=name), link.Judge(episode=name, first=0, last=0)):
             assert "There is no episode" in refusal(ask(question))
     assert ask(link.Browse()) == link.Recordings(episodes=())
-    assert len(read_episode(elsewhere).kept) == 2
+    assert len(episodes.read_episode(elsewhere).kept) == 2
 
 
 def test_damage_is_reported_and_the_rest_is_readable(ask: Ask, tmp_path: Path) -> None:

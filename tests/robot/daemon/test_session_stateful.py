@@ -4,17 +4,8 @@ import math
 from typing import Any, Literal
 
 import pytest
-from hypothesis import settings
+from hypothesis import settings, stateful
 from hypothesis import strategies as st
-from hypothesis.stateful import (
-    Bundle,
-    RuleBasedStateMachine,
-    consumes,
-    initialize,
-    invariant,
-    precondition,
-    rule,
-)
 
 from shapechanger.errors import LinkError
 from shapechanger.robot.cameras.camera import Frame
@@ -62,10 +53,10 @@ class Connected:
         return number, number > newest
 
 
-class Robot(RuleBasedStateMachine):
+class Robot(stateful.RuleBasedStateMachine):
     """Up to four clients that send any message at any time, and a reference model of the rules."""
 
-    clients = Bundle("clients")
+    clients = stateful.Bundle("clients")
 
     def __init__(self) -> None:
         super().__init__()
@@ -77,14 +68,14 @@ class Robot(RuleBasedStateMachine):
         self.command_in_force = self.suggestion = NOTHING
         self.emergency = False
 
-    @initialize(arming=st.sampled_from(("person", "anyone")))
+    @stateful.initialize(arming=st.sampled_from(("person", "anyone")))
     def serve(self, arming: Any) -> None:
         self.anyone_arms = arming == "anyone"
         self.hub = SessionHub(car_plan(arming=arming), self.clock, self.orders.append)
         self.report(False)
 
-    @precondition(lambda self: self.here < 4)
-    @rule(target=clients, role=st.sampled_from(("person", "program")))
+    @stateful.precondition(lambda self: self.here < 4)
+    @stateful.rule(target=clients, role=st.sampled_from(("person", "program")))
     def connect(self, role: Any) -> Connected:
         self.here += 1
         self.numbers += 1
@@ -94,7 +85,7 @@ class Robot(RuleBasedStateMachine):
         self.observe(client)
         return client
 
-    @rule(client=consumes(clients), garbage=st.none() | st.binary(max_size=20))
+    @stateful.rule(client=stateful.consumes(clients), garbage=st.none() | st.binary(max_size=20))
     def leave(self, client: Connected, garbage: bytes | None) -> None:
         """A client disconnects or sends invalid bytes; if it had control, the robot is disarmed."""
         if garbage is not None:
@@ -107,7 +98,7 @@ class Robot(RuleBasedStateMachine):
         self.forget_suggestion(client)
         self.lose_control(client)
 
-    @rule(client=clients)
+    @stateful.rule(client=clients)
     def take(self, client: Connected) -> None:
         held = self.holder
         self.send(client, link.Take())
@@ -118,12 +109,14 @@ class Robot(RuleBasedStateMachine):
                 self.command_in_force = NOTHING
             self.holder = client
 
-    @rule(client=clients)
+    @stateful.rule(client=clients)
     def release(self, client: Connected) -> None:
         self.send(client, link.Release())
         self.lose_control(client)
 
-    @rule(client=clients, by_holder=st.booleans(), emergency=st.integers(0, 2), back=_backs)
+    @stateful.rule(
+        client=clients, by_holder=st.booleans(), emergency=st.integers(0, 2), back=_backs
+    )
     def arm(self, client: Connected, by_holder: bool, emergency: int, back: int) -> None:
         """A client that sees the robot can arm it if a client has control.
 
@@ -138,26 +131,26 @@ class Robot(RuleBasedStateMachine):
         expected = [("arm", client.is_person, emergency)] if arms else []
         assert [(order.kind, order.person, order.emergency) for order in orders] == expected
 
-    @rule(client=clients)
+    @stateful.rule(client=clients)
     def stop(self, client: Connected) -> None:
         (order,) = self.send(client, link.EmergencyStop(reason="a\x1b[2Jcat"))
         reason = f"{client.session.client.name}: a [2Jcat"
         assert (order.kind, order.reason) == ("emergency", reason)
 
-    @rule(client=clients)
+    @stateful.rule(client=clients)
     def disarm(self, client: Connected) -> None:
         """A person can disarm the robot, and so can the client in control."""
         orders = self.send(client, link.Disarm())
         may = client.is_person or self.holder is client
         assert [order.kind for order in orders] == (["disarm"] if may else [])
 
-    @rule(client=clients)
+    @stateful.rule(client=clients)
     def observe(self, client: Connected) -> None:
         seen = client.session.observe()
         assert seen.mine == (self.holder is client)
         client.sent[seen.seq] = self.clock.ns
 
-    @rule(
+    @stateful.rule(
         client=clients,
         by_holder=st.booleans(),
         ahead=_aheads,
@@ -198,7 +191,7 @@ class Robot(RuleBasedStateMachine):
             self.command_in_force = (scaled, "", until_ns)
             assert orders[0].ttl_ms == ttl_ms
 
-    @rule(client=clients, ahead=_aheads, back=_backs, values=_values)
+    @stateful.rule(client=clients, ahead=_aheads, back=_backs, values=_values)
     def suggest(self, client: Connected, ahead: int, back: int, values: tuple[float, ...]) -> None:
         """A suggestion counts if its sender does not have control; it never moves the robot."""
         self.observe(client)
@@ -209,7 +202,7 @@ class Robot(RuleBasedStateMachine):
             name = client.session.client.name
             self.suggestion = (values, name, self.clock.ns + DEADLINE_MS * MS)
 
-    @rule(
+    @stateful.rule(
         client=clients,
         request=st.sampled_from(
             (
@@ -230,17 +223,17 @@ class Robot(RuleBasedStateMachine):
         assert not self.send(client, request)
         assert not self.hub.recorder.on
 
-    @rule(milliseconds=st.sampled_from((1, 100, 250, 400)) | st.integers(1, 600))
+    @stateful.rule(milliseconds=st.sampled_from((1, 100, 250, 400)) | st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
         self.clock.ns += milliseconds * MS
 
-    @rule(emergency=st.booleans())
+    @stateful.rule(emergency=st.booleans())
     def report(self, emergency: bool) -> None:
         self.emergency = emergency
         self.hub.on_state(guard_state(at_ns=self.clock.ns, armed=True, emergency=emergency))
         self.hub.on_frame(Frame(b"jpeg", self.clock.ns))
 
-    @invariant()
+    @stateful.invariant()
     def only_allowed_commands_reach_the_guard(self) -> None:
         """The guard gets the commands of the model, in order, with increasing lease and number."""
         commands = [order for order in self.orders if order.kind == "command"]
@@ -248,19 +241,19 @@ class Robot(RuleBasedStateMachine):
         numbers = [(order.session, order.seq) for order in commands]
         assert numbers == sorted(set(numbers))
 
-    @invariant()
+    @stateful.invariant()
     def the_loss_of_control_disarms_the_robot(self) -> None:
         """Each loss of control by a disconnection or release causes one order to disarm."""
         lost = [o for o in self.orders if o.kind == "disarm" and not o.reason.endswith("disarmed")]
         assert len(lost) == self.stops
         assert all(order.reason for order in lost)
 
-    @invariant()
+    @stateful.invariant()
     def only_invalid_commands_and_a_new_holder_halt_the_robot(self) -> None:
         """Late and repeated commands, and commands of other clients, do not halt the robot."""
         assert sum(order.kind == "halt" for order in self.orders) == self.halts
 
-    @invariant()
+    @stateful.invariant()
     def the_expected_commands_are_shown(self) -> None:
         """Holder, current command and newest suggestion are the same as in the model."""
         held = None if self.holder is None else self.holder.session.client

@@ -70,29 +70,23 @@ def tensed() -> Iterator[_Bench]:
     made.robot.close()
 
 
-def test_no_servo_pulls_before_the_first_command(bench: _Bench) -> None:
+def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
+    """Flexors reach their commanded lengths with at most their largest tension.
+
+    No servo has torque before the first command. At the command 0, each servo pulls with its
+    pretension, within one count of its goal.
+    """
     assert bench.seen.armed
     assert not any(servo.has_torque for servo in bench.rig.servos.values())
-
-
-def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
-    """Flexors reach their commanded lengths with at most their largest tension."""
     bench.drive(_FLEX, 100)
     assert bench.seen.stop_reason == ""
     assert bench.state("FDP/length") < -0.008
     assert bench.state("FDS/length") < -0.005
     assert bench.seen.action_applied == pytest.approx(_FLEX)
-    friction = bench.rig.servo("FDP").motor._model.friction_nm / 0.010
-    most = 15.0 if family == "Dynamixel" else 25.0
-    assert max(bench.rig.tensions().values()) < most + 2.0 * friction
-
-
-def test_rest_is_the_pretension(bench: _Bench, family: str) -> None:
-    """At the command 0, each servo pulls with its pretension, within one count of its goal."""
-    bench.drive(_FLEX, 25)
-    bench.drive(_REST, 25)
-    pretension = 1.0 if family == "Dynamixel" else 6.0
     model = bench.rig.servo("FDP").motor._model
+    most, pretension = (15.0, 1.0) if family == "Dynamixel" else (25.0, 6.0)
+    assert max(bench.rig.tensions().values()) < most + 2.0 * model.friction_nm / 0.010
+    bench.drive(_REST, 25)
     goals = [abs(a) * model.torque_constant / 0.010 for a in bench.pulls()]
     assert goals == pytest.approx([pretension] * 7, abs=model.ampere_per_goal * 100)
 

@@ -10,15 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from shapechanger.demos.episodes import Drop, Keep, Step, edit, read_outline
-from shapechanger.demos.episodes.records import (
-    FRAMES,
-    HEADER,
-    MAX_PICTURE_BYTES,
-    STEPS,
-    is_episode,
-    parse_line,
-)
+from shapechanger.demos.episodes import Drop, Keep, Step, edit, read_outline, records
 from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.files import read_file
 from shapechanger.robot.daemon.recorder import Worker
@@ -72,7 +64,7 @@ class RecordingLibrary:
         path = self._folder / name
         try:
             # These values change whenever the episode changes.
-            found = ((path / STEPS).stat(), (path / HEADER).stat())
+            found = ((path / records.STEPS).stat(), (path / records.HEADER).stat())
             stamp = tuple((one.st_mtime_ns, one.st_size, one.st_ino) for one in found)
             known = self._known.get(name)
             if known is not None and known[0] == stamp:
@@ -110,16 +102,16 @@ class RecordingLibrary:
         return path
 
     def _piece(self, path: Path, question: messages.Fetch) -> messages.Piece:
-        steps = path / STEPS
+        steps = path / records.STEPS
         if self._index.path != steps:
             self._index = LineIndex(steps)
-        index, header = self._index, (path / HEADER).read_bytes().decode()
+        index, header = self._index, (path / records.HEADER).read_bytes().decode()
         lines: list[str] = []
         frames: list[bytes | None] = []
         size, frame_before = len(header), ""
         for number, line in enumerate(index.lines(question.first, question.count), question.first):
             try:
-                parsed = parse_line(line.encode() + b"\n")
+                parsed = records.parse_line(line.encode() + b"\n")
             except ValueError as error:
                 raise DemosError(
                     f"Line {number + 1} of {steps} is damaged, because {error}."
@@ -127,7 +119,7 @@ class RecordingLibrary:
             name = parsed.frame if isinstance(parsed, Step) else ""
             frame = None
             if name and name != frame_before:
-                frame = read_file(path / FRAMES / name, MAX_PICTURE_BYTES)
+                frame = read_file(path / records.FRAMES / name, records.MAX_PICTURE_BYTES)
             size += len(line.encode()) + len(frame or b"")
             if lines and size > messages.MAX_PIECE:
                 break
@@ -179,4 +171,8 @@ class LineIndex:
 
 def _is_listed(path: Path) -> bool:
     """Return True for the folder of an episode, but not for a link to another folder."""
-    return bool(_EPISODE_ID.fullmatch(path.name)) and not path.is_symlink() and is_episode(path)
+    return (
+        bool(_EPISODE_ID.fullmatch(path.name))
+        and not path.is_symlink()
+        and records.is_episode(path)
+    )

@@ -17,17 +17,7 @@ from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.chip import (
-    BusNumber,
-    Claim,
-    I2cDevice,
-    I2cKeys,
-    KeyMistake,
-    Keys,
-    SensorChip,
-    device_errors,
-    i2c_claims,
-)
+from shapechanger.robot.drivers import chip
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
@@ -50,7 +40,7 @@ _TOO_STRONG: Final = 0x08
 _MOST_MISSED: Final = 5
 
 
-class JointKeys(Keys, frozen=True, kw_only=True):
+class JointKeys(chip.Keys, frozen=True, kw_only=True):
     """Keys of one joint, which has its own table.
 
     Attributes:
@@ -70,7 +60,7 @@ class JointKeys(Keys, frozen=True, kw_only=True):
         return self.direction * turned * 2.0 * math.pi / COUNTS_PER_TURN
 
 
-class As5600Keys(Keys, frozen=True, kw_only=True):
+class As5600Keys(chip.Keys, frozen=True, kw_only=True):
     """Keys of the encoders at joints.
 
     Attributes:
@@ -79,7 +69,7 @@ class As5600Keys(Keys, frozen=True, kw_only=True):
         rows: Joints, keyed by name.
     """
 
-    bus: BusNumber = 1
+    bus: chip.BusNumber = 1
     mux: Annotated[int, Meta(ge=0x70, le=0x77)] = 0x70
     rows: dict[str, JointKeys]
 
@@ -88,24 +78,26 @@ class As5600Keys(Keys, frozen=True, kw_only=True):
         users: dict[int, str] = {}
         for name, joint in self.rows.items():
             if (other := users.setdefault(joint.channel, name)) != name:
-                raise KeyMistake(name, f"has the channel {joint.channel}, which {other} has, too")
+                raise chip.KeyMistake(
+                    name, f"has the channel {joint.channel}, which {other} has, too"
+                )
 
-    def claims(self) -> Iterator[Claim]:
+    def claims(self) -> Iterator[chip.Claim]:
         """Return the claims of the addresses; all encoders of a bus share one address."""
-        yield from i2c_claims(self.bus, "mux", self.mux)
-        yield Claim("driver", f"address {ADDRESS:#x} of I2C bus {self.bus}")
+        yield from chip.i2c_claims(self.bus, "mux", self.mux)
+        yield chip.Claim("driver", f"address {ADDRESS:#x} of I2C bus {self.bus}")
 
 
 Magnet = Literal["", "gone", "weak", "strong"]
 """State of the magnet: in order (""), missing, too weak or too strong."""
 
 
-class As5600(I2cDevice):
+class As5600(chip.I2cDevice):
     """Encoders of several joints, behind the multiplexer; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         keys = As5600Keys.of(plan.settings)
-        mux = I2cKeys(bus=keys.bus, address=keys.mux)
+        mux = chip.I2cKeys(bus=keys.bus, address=keys.mux)
         super().__init__(f"The multiplexer of sensor {plan.name!r}", mux, hardware)
         self.joints = keys.rows
         self._missed = dict.fromkeys(keys.rows, 0)
@@ -113,9 +105,9 @@ class As5600(I2cDevice):
     def measure(self, joint: str) -> tuple[int, Magnet]:
         """Read the raw angle of one joint, 0 to 4095; it is meaningless without a magnet."""
         channel = self.joints[joint].channel
-        with device_errors(self.name):
+        with chip.device_errors(self.name):
             self._bus.write_byte(self._address, 1 << channel)
-        with device_errors(f"The encoder of {joint}, on channel {channel},"):
+        with chip.device_errors(f"The encoder of {joint}, on channel {channel},"):
             status, high, low = self._bus.read_i2c_block_data(ADDRESS, _STATUS, 3)
         magnet: Magnet = "strong" if status & _TOO_STRONG else "weak" if status & _TOO_WEAK else ""
         if not status & _MAGNET_DETECTED:
@@ -189,8 +181,7 @@ class Tca9548a(SimulatedChip):
 class SimulatedAs5600s(SimulatedChip):
     """AS5600 chips behind a multiplexer, at their common address; they have no settings.
 
-    `measured` returns one reading of a joint's angle, rad, and raises RobotError for an unknown
-    joint.
+    `measured` returns one reading of a joint's angle, rad.
     """
 
     def __init__(
@@ -250,7 +241,7 @@ def _features(plan: SensorPlan) -> list[Feature]:
     ]
 
 
-AS5600: Final = SensorChip(
+AS5600: Final = chip.SensorChip(
     measures="joints",
     keys=As5600Keys,
     open=open_and_read,

@@ -189,11 +189,7 @@ _OPEN: Final = WeakValueDictionary[tuple[Hardware, int, int], Pca9685]()
 
 
 class Pca9685Channel(PulseChannel):
-    """One channel, opened without pulses.
-
-    RobotError is raised if the chip does not respond, the channel is used twice, or another channel
-    of the chip has another frequency or enable pin.
-    """
+    """One channel, opened without pulses."""
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         keys, hz = Pca9685Keys.of(plan.settings), plan.settings["hz"]

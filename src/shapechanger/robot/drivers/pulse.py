@@ -371,7 +371,7 @@ class SpeedController:
     def __call__(self, value: float | None, now_ns: int) -> float:
         """Return the value for the motor, -1 to 1, from the value of the pulses, -1 to 1.
 
-        Without pulses or power, None, it stops and must see neutral again.
+        The value None means no pulses or no power: it then stops, and must see neutral again.
         """
         if value is None:
             self._armed = self._braked = self._reverses = False

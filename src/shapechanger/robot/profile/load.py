@@ -150,16 +150,13 @@ def write_profile(
 
 
 def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile:
-    """Change values, or add keys to existing tables, atomically.
+    """Change values, or add keys to existing tables, atomically, and return the new profile.
 
     Comments, order and blank lines are kept.
 
     Args:
         path: The file; a symbolic link is followed.
         changes: New values, keyed by dotted name, such as `output.steering.centre_us`.
-
-    Returns:
-        The profile after the change.
 
     Raises:
         ProfileError: If the file is not a valid profile, before or after the change.

@@ -90,11 +90,13 @@ class Board:
             )
         ledger = at.ledger_path.open("xb", buffering=0)
         wiring = TwinWiring(plan, settings.one_shot_ms)
-        self._pins = PinBoard(wiring, world, ledger, seed, self.now_ns, self._camera)
+        self._pins = pins = PinBoard(wiring, world, ledger, seed, self.now_ns, self._camera)
         self._tick_hz = plan.tick_hz
         self._clock: Literal["real", "twin"] = settings.clock
         own = (self.greet, self.leave, self.wait, self.sleep)
-        functions = (*own, *self._pins.functions, *operator_functions(self._pins))
+        chips = (pins.read_chip, pins.write_chip, pins.read_servos, pins.write_servos)
+        of_robot = (pins.claim, pins.drive, pins.pulse, *chips)
+        functions = (*own, *of_robot, *operator_functions(pins))
         self._functions = {one.__name__: _served(one) for one in functions}
         # Connections of clients, keyed by descriptor, in the order in which they connected.
         self._connections: dict[int, BoardConnection] = {}

@@ -112,10 +112,7 @@ class TwinPinFactory(PiFactory):
         self._pulsed: set[int] = set()
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        """Send servo pulses on a pin; see `LowAtOnceFactory.pulse`.
-
-        If the process dies, the pin keeps the level that it has at that moment.
-        """
+        """Send servo pulses; if the process dies, the pin keeps its level at that moment."""
         if pin not in self._pulsed:
             self.board.ask(int, "claim", pin, "output", "floating", 0)
             self._pulsed.add(pin)

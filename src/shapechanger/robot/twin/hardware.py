@@ -10,14 +10,7 @@ from typing import Any, ClassVar
 
 from shapechanger.errors import translate_errors
 from shapechanger.robot.hardware import Clock, Hardware, ServoReply
-from shapechanger.robot.twin.rpc import (
-    MAX_MESSAGE,
-    BoardClient,
-    Slept,
-    board_gone,
-    decode_reply,
-    encode_call,
-)
+from shapechanger.robot.twin import rpc
 
 
 class SteadyClock(Clock):
@@ -25,7 +18,7 @@ class SteadyClock(Clock):
 
     is_real: ClassVar = False
 
-    def __init__(self, client: BoardClient) -> None:
+    def __init__(self, client: rpc.BoardClient) -> None:
         self._client = client
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
@@ -61,7 +54,7 @@ class GrantedClock(SteadyClock):
     A process that calls `wait` becomes a participant; time advances only while all of them wait.
     """
 
-    def __init__(self, client: BoardClient, path: str) -> None:
+    def __init__(self, client: rpc.BoardClient, path: str) -> None:
         super().__init__(client)
         self._path = path
 
@@ -81,15 +74,15 @@ class GrantedClock(SteadyClock):
 
         loop = asyncio.get_running_loop()
         with (
-            translate_errors(OSError, to=board_gone),
+            translate_errors(OSError, to=rpc.board_gone),
             socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as connection,
         ):
             connection.setblocking(False)
             await loop.sock_connect(connection, self._path)
-            call = encode_call("sleep", max(0, round(seconds * 1e9)), id=0)
+            call = rpc.encode_call("sleep", max(0, round(seconds * 1e9)), id=0)
             await loop.sock_sendall(connection, call)
-            reply = decode_reply(await loop.sock_recv(connection, MAX_MESSAGE))
-        slept = reply.decode(Slept)
+            reply = rpc.decode_reply(await loop.sock_recv(connection, rpc.MAX_MESSAGE))
+        slept = reply.decode(rpc.Slept)
         self._client.now_ns = max(self._client.now_ns, slept.t)
         return slept.captured_ns
 
@@ -97,7 +90,7 @@ class GrantedClock(SteadyClock):
 class TwinBus:
     """The part of `smbus2.SMBus` that the drivers use; a missing chip raises OSError."""
 
-    def __init__(self, board: BoardClient, bus: int) -> None:
+    def __init__(self, board: rpc.BoardClient, bus: int) -> None:
         self._board = board
         self._bus = bus
 
@@ -122,7 +115,7 @@ class TwinBus:
 class TwinServoPort:
     """Port of the servo bus; see `ServoPort`. Its servos reply at once or never."""
 
-    def __init__(self, board: BoardClient, device: str) -> None:
+    def __init__(self, board: rpc.BoardClient, device: str) -> None:
         self._board = board
         self._device = device
         self.has_stray = False
@@ -143,7 +136,7 @@ class TwinServoPort:
 class TwinHardware(Hardware):
     """Pins, buses and time of a board; see `shapechanger.robot.hardware.Hardware`."""
 
-    def __init__(self, board: BoardClient, clock: SteadyClock) -> None:
+    def __init__(self, board: rpc.BoardClient, clock: SteadyClock) -> None:
         self.board = board
         self.clock = clock
         self._pin_factory: Any = None
@@ -172,6 +165,6 @@ class TwinHardware(Hardware):
 
 def connect(path: str) -> TwinHardware:
     """Connect to the board that listens on a socket."""
-    client = BoardClient(path, "hardware")
+    client = rpc.BoardClient(path, "hardware")
     clock = GrantedClock(client, path) if client.clock == "twin" else SteadyClock(client)
     return TwinHardware(client, clock)

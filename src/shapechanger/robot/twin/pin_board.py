@@ -20,6 +20,7 @@ from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.drivers.servos.settings import DRIVER, bus_settings
 from shapechanger.robot.drivers.servos.simulation import Rig
 from shapechanger.robot.drivers.simulation import (
+    NO_PULSE,
     Edge,
     Levels,
     Pulse,
@@ -53,7 +54,8 @@ class PinBoard:
     """Pins, chips, servos and world, for a robot's processes and its operator.
 
     Changes of outputs are written to the `ledger`, unless it is None. The `seed` selects the phase
-    of software PWM, and `clock` returns the time, ns.
+    of software PWM, and `clock` returns the time, ns. A process that uses a pin without having
+    claimed it gets a RobotError. A chip that does not reply gives the kernel's OSError.
     """
 
     def __init__(
@@ -148,16 +150,6 @@ class PinBoard:
         """Return the process that has claimed a pin as an input, or None."""
         claim = self._claims.get(pin)
         return claim.owner if claim is not None and claim.mode == "input" else None
-
-    @property
-    def functions(self) -> tuple[Callable[..., object], ...]:
-        """Functions that a robot's processes may call.
-
-        They raise RobotError if the caller has not claimed the pin, or another process holds it,
-        and OSError with the `errno` of the kernel's driver if no chip replies.
-        """
-        chips = (self.read_chip, self.write_chip, self.read_servos, self.write_servos)
-        return (self.claim, self.drive, self.pulse, *chips)
 
     def claim(
         self,
@@ -257,7 +249,7 @@ class PinBoard:
         changed: list[tuple[int, Pulse]] = []
         for number, pulse in enumerate(chip.pulses):
             channel = PwmChannel(*at, number)
-            before = self.levels.channels.get(channel, Pulse(0.0, 0.0))
+            before = self.levels.channels.get(channel, NO_PULSE)
             if pulse.us != before.us or (pulse.us and pulse.hz != before.hz):
                 changed.append((number, pulse))
                 self.levels.channels[channel] = pulse

@@ -173,12 +173,7 @@ class DrivingWorld(World):
         self._slopes = down / np.hypot(right, ahead)
 
     def _cast(self, bearings: _Floats) -> tuple[_Floats, NDArray[np.intp], _Floats]:
-        """Cast rays from the vehicle to the walls.
-
-        Returns:
-            For each ray, the distance, m, the number of the wall, 0 to 3, and the position along
-            the wall, m.
-        """
+        """Return each ray's distance to a wall, m, the wall, 0 to 3, and the place along it, m."""
         cos, sin = np.cos(self._heading + bearings), np.sin(self._heading + bearings)
         with np.errstate(divide="ignore"):
             to_end = np.where(cos > 0.0, ROOM_LENGTH - self._x, self._x) / np.abs(cos)

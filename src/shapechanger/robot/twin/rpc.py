@@ -157,9 +157,7 @@ class BoardClient:
     def wait(self, until_ns: int = 0, at_most_s: float = 0.0) -> bool:
         """Wait until the board reports edges, or advances twin time to the next tick or `until_ns`.
 
-        Returns:
-            True after a report, which updates `now_ns` and `levels`; False after `at_most_s`
-            seconds of real time.
+        Return True after a report, which updates `now_ns` and `levels`, or False after `at_most_s`.
         """
         self._waits = self._waits or self._call("wait", until_ns)
         poll = select.poll()

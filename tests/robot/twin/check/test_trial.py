@@ -146,5 +146,6 @@ def test_the_bench_of_a_twin(
     for name, fault in FAULTS.items():
         assert (f"  {name}: At rest " in text) == fault.on_pins
     assert "At rest never" not in text
+    assert "without an encoder, it is unknown whether the wheels did" in text
     assert text.strip().endswith("not measured.")
     assert "wrote leds-report.txt" in capsys.readouterr().out

@@ -239,9 +239,8 @@ class TendonServo:
     def see(self, data: bytes, now_ns: int, *, pulls: bool) -> dict[str, float]:
         """Evaluate the block of present values of a servo, with or without torque.
 
-        Returns:
-            "length" beyond the zero, m, if it has a zero; "speed", m/s, positive while the tendon
-            gets longer; and "tension", N, without the gears' friction and at least 0.
+        Return "length" beyond the zero, m, if it has a zero; "speed", m/s, positive while the
+        tendon gets longer; and "tension", N, without the gears' friction and at least 0.
         """
         self.missed, self._was_late = 0, False
         servo, model, family = self.settings, self._model, self._family

@@ -53,7 +53,7 @@ class SimulatedMotor:
     """A motor with its gears, its spool and its end of a tendon of a `stiffness`, N/m.
 
     It has an `angle` over many turns, rad, a `speed`, rad/s, a `current`, A, a `temperature`,
-    degrees Celsius, and the `tension` of the tendon, N. At the servo's zero, the tendon is taut.
+    degrees Celsius, and the `tension` of the tendon, N. The tendon is just taut at the zero.
     """
 
     def __init__(self, settings: ServoSettings, stiffness: float = CABLE_N_PER_M) -> None:
@@ -135,8 +135,7 @@ _STALL_AT: Final = 2.0 * math.pi / 32.0  # Error of the position at the stall cu
 class SimulatedServo:
     """A simulated servo, whose tendon has a `stiffness`, N/m.
 
-    `pulls_a` is its goal current in effect, A, with its sign; with control of the length, its
-    limit.
+    `pulls_a` is its goal current in effect, A, with its sign, or the limit of its current.
     """
 
     def __init__(self, settings: ServoSettings, stiffness: float) -> None:
