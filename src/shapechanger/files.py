@@ -35,9 +35,7 @@ def place_of(text: str, error: Exception) -> str:
 def read_text(path: Path) -> str:
     """Read a text file of a user, in UTF-8 with or without a byte-order mark.
 
-    Raises:
-        OSError: If the file cannot be read.
-        ValueError: If the file has another encoding; the message is the end of a sentence.
+    The message of a ValueError about another encoding is the end of a sentence.
     """
     data = path.read_bytes()
     try:
@@ -49,14 +47,9 @@ def read_text(path: Path) -> str:
 
 
 def read_file(path: Path, most: int) -> bytes:
-    """Return the content of a regular file, which need not be trusted.
+    """Return the content of a file of at most `most` bytes, which need not be trusted.
 
-    Args:
-        path: The file; a pipe or a device, which may never end, is refused unread.
-        most: Largest size to read, bytes.
-
-    Raises:
-        OSError: If the path cannot be read, is not a regular file, or is larger.
+    Raises OSError for larger files, and for pipes and devices, which may never end.
     """
     # Opened without blocking, because opening a pipe without a writer would block.
     fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
@@ -72,11 +65,7 @@ def read_file(path: Path, most: int) -> bytes:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and its parents, and check that it is writable.
-
-    Raises:
-        OutputError: If the folder cannot be made or written to.
-    """
+    """Make a folder and its parents; raise OutputError unless it is writable."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".writable"
@@ -85,26 +74,16 @@ def make_folder(folder: Path) -> None:
 
 
 def require_file(path: Path) -> None:
-    """Check that a file can be written, and make its folder.
-
-    Raises:
-        OutputError: If the path is a folder, or its folder cannot be made or written to.
-    """
+    """Make the folder of a file; raise OutputError unless the file can be written."""
     if path.is_dir():
         raise OutputError(f"Cannot write {path}: it is a folder.")
     make_folder(path.parent)
 
 
 def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
-    """Replace a file and flush it to disk; after a failure the old file is unchanged.
+    """Replace a file and flush it to disk; after an OutputError the old file is unchanged.
 
-    Args:
-        path: The file.
-        content: New content of the file.
-        mode: Permissions of the new file; None for the permissions of the old file.
-
-    Raises:
-        OutputError: If the file cannot be written.
+    `mode` are the permissions of the new file; None for the permissions of the old file.
     """
     with writing(path):
         if mode is None and path.exists():
@@ -113,15 +92,9 @@ def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
 
 
 def write_new(path: Path, content: bytes, mode: int | None = None) -> None:
-    """Write a new file completely or not at all; a missing folder is made.
+    """Write a new file completely or not at all; raise OSError if it exists.
 
-    Args:
-        path: The file.
-        content: Content of the file.
-        mode: Permissions of the file; None for the default of the process.
-
-    Raises:
-        OSError: If the file exists or cannot be written.
+    A missing folder is made. `mode` are its permissions; None for the default of the process.
     """
     if os.path.lexists(path):
         raise FileExistsError(path)
@@ -168,13 +141,7 @@ def append_line(path: Path, value: Any) -> None:
 def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
     """Read a value from a file of `write_json`.
 
-    Args:
-        path: The file.
-        kind: Type of the content.
-        remedy: Advice for the user on failure, as the end of a sentence.
-
-    Raises:
-        CorruptStudy: If the file cannot be read or has other content.
+    Raises CorruptStudy, whose message ends with `remedy`, if the file has other content.
     """
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind, dec_hook=from_builtins)

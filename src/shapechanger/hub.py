@@ -14,6 +14,7 @@ import hashlib
 import re
 from collections.abc import Generator
 from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from multiprocessing.pool import ThreadPool
@@ -29,11 +30,7 @@ from shapechanger.layout import Layout
 Kind = Literal["policy", "demonstrations"]
 
 POLICY: Final = "policy.safetensors"
-"""Name of the file of a policy."""
-
 EPISODES: Final = "episodes"
-"""Folder of the episodes."""
-
 _LIST, _CARD = "shapechanger.json", "README.md"
 _FORMAT: Final = 1
 _TYPES: Final[dict[Kind, str]] = {"policy": "model", "demonstrations": "dataset"}
@@ -103,16 +100,9 @@ def sha256_of(path: Path) -> str:
 def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False) -> str:
     """Upload a folder, replacing an earlier push, and return the address of the commit.
 
-    Args:
-        folder: Folder with the files, to which the card and the list are added.
-        card: Description of the files, in Markdown.
-        repo: Name of the repository, such as "ada/ant"; it is created if it does not exist.
-        kind: Kind of the files.
-        public: Whether a new repository can be read by everybody.
-
-    Raises:
-        HubError: If the Hub refuses, or the repository contains other files.
-        MissingExtra: If huggingface_hub is not installed.
+    `card` describes the files, in Markdown; the card and the list are added to the folder. A
+    repository, such as "ada/ant", is created if it does not exist, and only its owner can read it
+    unless it is `public`. Raises HubError if it contains other files.
     """
     repo_type = _TYPES[kind]
     files = {
@@ -146,18 +136,9 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
 def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: int) -> str:
     """Download the files of a push, check them, and return the commit that was pulled.
 
-    Args:
-        repo: Name of the repository, such as "ada/ant".
-        kind: Kind of the repository's files.
-        folder: An existing folder to write to; after an error it may contain incomplete files.
-        revision: Commit, branch or tag; "" for the newest commit.
-        max_bytes: Largest size of all files together.
-
-    Raises:
-        HubError: If the Hub refuses, or the files differ from the repository's list, are of another
-            kind, or are larger than `max_bytes`.
-        OutputError: If the folder cannot be written to.
-        MissingExtra: If huggingface_hub is not installed.
+    `revision` is a commit, branch or tag; "" for the newest commit. Raises HubError if the files
+    differ from the repository's list, are of another kind, or have more than `max_bytes` together.
+    After an error, `folder`, which must exist, may contain incomplete files.
     """
     repo_type = _TYPES[kind]
     with _hub(repo, kind) as hub:
@@ -168,11 +149,8 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
         if not 0 < sizes.get(_LIST, 0) <= _MAX_LIST_BYTES:
             raise HubError(f"{repo} has no {_LIST}, so Shapechanger did not push it.")
 
-        def fetch(name: str) -> None:
-            hub.hf_hub_download(
-                repo, name, repo_type=repo_type, revision=found.sha, local_dir=folder
-            )
-
+        where = {"repo_type": repo_type, "revision": found.sha, "local_dir": folder}
+        fetch = partial(hub.hf_hub_download, repo, **where)
         fetch(_LIST)
         listed = _listed((folder / _LIST).read_bytes(), repo, kind)
         held = {name for name in sizes if name.split("/")[0] == _PLACES[kind]}
@@ -228,20 +206,14 @@ def _hub(repo: str, kind: Kind) -> Generator[Any]:
         raise OutputError(f"Cannot write {error.filename}: {error.strerror}.") from error
     except Exception as error:  # Classes of connection errors depend on the version.
         code = getattr(getattr(error, "response", None), "status_code", 0)
-        codes = {
-            401: f"The Hub requires a login for {repo}: {_LOG_IN}.",
-            403: f"The Hub forbids this for {repo}: use a token that may write to it.",
-        }
-        missing = (
-            f"There is no {_TYPES[kind]} {repo} on the Hub, or it is private: check the name, and "
-            f"{_LOG_IN}."
-        )
-        sentences = {
-            errors.HFValidationError: no_name,
-            errors.RevisionNotFoundError: f"{repo} has no such revision.",
-            errors.RepositoryNotFoundError: missing,
-            errors.HfHubHTTPError: codes.get(code, f"The Hub answered {code} for {repo}."),
-            Exception: f"The connection to the Hub failed ({type(error).__name__}): try again.",
-        }
-        found = next(text for class_, text in sentences.items() if isinstance(error, class_))
-        raise HubError(found) from error
+        if isinstance(error, errors.HFValidationError):
+            text = no_name
+        elif isinstance(error, errors.RevisionNotFoundError):
+            text = f"{repo} has no such revision."
+        elif isinstance(error, errors.RepositoryNotFoundError):
+            text = f"There is no {_TYPES[kind]} {repo} on the Hub, or it is private: {_LOG_IN}."
+        elif code in (401, 403):
+            text = f"The Hub forbids this for {repo}: {_LOG_IN}, with a token that may write to it."
+        else:
+            text = f"The Hub failed for {repo} ({code or type(error).__name__}): try again."
+        raise HubError(text) from error

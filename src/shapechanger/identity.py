@@ -1,8 +1,8 @@
 """Identity of an env, a method or a learner: hashes of the robot's model and of the user's files.
 
-The name of an env, a method or a learner, such as an id, a path or `module:Name`, stays the same if
-its file is edited. Identities distinguish such versions, so that runs of different versions are
-never averaged and a policy is never used with another robot by mistake.
+A name, such as an id, a path or `module:Name`, stays the same if its file is edited. Identities
+distinguish such versions, so that runs of different versions are never averaged and a policy is
+never used with another robot by mistake.
 
 A module is custom if it is not in the standard library, in a folder of installed packages, or in
 Shapechanger. Custom modules that it imports are part of the identity too.
@@ -59,12 +59,9 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
     files: dict[str, str] = {}
 
     def changes_to(self, other: Identity) -> str:
-        """Describe how another version differs; empty if it is the same.
+        """Describe how a newer version differs; empty if it is the same.
 
         Models are compared only if both identities have a model.
-
-        Args:
-            other: The other version, which is the newer one.
         """
 
         def changed(what: str, old: str, new: str) -> Iterator[str]:
@@ -85,12 +82,7 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> Identity:
-    """Return the identity of an env that has been made.
-
-    Args:
-        env: The env, with its wrappers.
-        env_id: Id of the env, which may name a module, as `module:id`.
-    """
+    """Return the identity of a wrapped env, whose id may name a module, as `module:id`."""
     arguments: dict[str, Any] = {} if env.spec is None else dict(env.spec.kwargs)
     names = modules_of_env(env, env_id)
     model = getattr(env.unwrapped, "model", None)
@@ -105,11 +97,9 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> Identity:
 
 
 def identify_code(names: Iterable[str], *objects: Any) -> Identity:
-    """Return the identity of a part without a model, such as a method.
+    """Return the identity of a part without a model: of modules that define it.
 
-    Args:
-        names: Names such as `my_methods:warm-start`, and other texts, which are skipped.
-        *objects: Objects whose modules are included.
+    The modules are those of objects, and of texts such as `my_methods:warm-start`.
     """
     return Identity(files=own_modules({*named_modules(names), *modules_of(*objects)}))
 
@@ -138,16 +128,11 @@ def _sees(space: gym.Space[Any]) -> bool:
 
 
 def own_modules(names: Iterable[str]) -> dict[str, str]:
-    """Return the hashes of custom modules, and of the custom modules that they import.
+    """Return the hashes of custom modules among `names`, and of custom modules that they import.
 
-    Comments are hashed; line ends and the block `if __name__ == "__main__":` are not.
-
-    Args:
-        names: Dotted names of modules; modules that are not custom are skipped.
-
-    Returns:
-        The first 16 hex digits of the SHA-256 of each source, keyed by the path below the folder
-        that it is imported from, such as `tasks/jump.py`.
+    They are the first 16 hex digits of the SHA-256 of each source, keyed by the path below the
+    folder that it is imported from, such as `tasks/jump.py`. Comments are hashed; line ends and the
+    block `if __name__ == "__main__":` are not.
     """
     found: dict[str, str] = {}
     waiting, seen = list(names), {""}
@@ -168,7 +153,10 @@ def own_modules(names: Iterable[str]) -> dict[str, str]:
         if file.suffix == ".py":
             source, imported = _read(source, package)
             waiting += imported
-        waiting += _used_by(sys.modules.get(name))
+        # Modules that define its attributes, however they were imported.
+        values = vars(sys.modules[name]).values() if name in sys.modules else ()
+        used = [each for each in [*values] if isinstance(each, ModuleType) or callable(each)]
+        waiting += modules_of(*used) - {*_SCRIPTS}
         depth = len(package.split(".")) if package else 0
         key = Path(*file.parts[-1 - depth :]).as_posix()
         found[key] = _hash_of(source)
@@ -189,12 +177,7 @@ def modules_of(*objects: Any) -> set[str]:
 
 
 def modules_of_env(env: Any, env_id: str = "") -> set[str]:
-    """Return the names of the modules that define an env: wrappers, body, task and measures.
-
-    Args:
-        env: The env.
-        env_id: Id of the env, which may name a module, as `module:id`.
-    """
+    """Return the names of the modules that define an env: wrappers, body, task and measures."""
     spec: Any = getattr(env, "spec", None)
     arguments: dict[str, Any] = {} if spec is None else dict(spec.kwargs)
     entry: Any = None if spec is None else spec.entry_point
@@ -246,13 +229,6 @@ def _read(source: bytes, package: str) -> tuple[bytes, list[str]]:
         if isinstance(node, ast.If) and not node.orelse and ast.unparse(node.test) == _GUARD:
             del lines[node.lineno - 1 : node.end_lineno]
     return b"\n".join(lines), imported
-
-
-def _used_by(module: ModuleType | None) -> set[str]:
-    """Return the modules that define a module's attributes, however they were imported."""
-    values = () if module is None else tuple(vars(module).values())
-    named = [each for each in values if isinstance(each, ModuleType | type) or callable(each)]
-    return modules_of(*named) - {*_SCRIPTS}
 
 
 def texts_in(value: Any) -> Iterator[str]:

@@ -28,11 +28,9 @@ _HIGHEST: Final = math.inf
 
 
 class Element(msgspec.Struct, frozen=True):
-    """The part of the embodiment that a feature belongs to.
+    """The part of the embodiment that a feature belongs to, with its name in the model or profile.
 
-    Attributes:
-        kind: Kind of part; "task" for a number that belongs to no part, such as a goal.
-        name: Name in the model or in the robot's profile.
+    The kind is "task" for a number that belongs to no part, such as a goal.
     """
 
     kind: ElementKind
@@ -133,12 +131,7 @@ class Layout(msgspec.Struct, frozen=True):
         return any(feature.name == name for feature in self.features)
 
     def __getitem__(self, name: str | int) -> Feature:
-        """Return the feature with a name or an index.
-
-        Raises:
-            UnknownName: If no feature has this name.
-            IndexError: If the index is out of range.
-        """
+        """Return the feature with a name or an index; UnknownName if there is no such name."""
         if not isinstance(name, str):
             return self.features[name]
         for feature in self.features:
@@ -198,11 +191,7 @@ class Layout(msgspec.Struct, frozen=True):
 
     @classmethod
     def from_json(cls, text: str | bytes) -> Layout:
-        """Read a layout from the JSON of `to_json`.
-
-        Raises:
-            LayoutError: If the text is not a layout.
-        """
+        """Read a layout from the JSON of `to_json`; LayoutError for other texts."""
         try:
             return msgspec.json.decode(text, type=cls)
         except msgspec.MsgspecError as error:

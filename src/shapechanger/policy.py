@@ -36,13 +36,13 @@ ONNX_CARD: Final = "shapechanger"
 STEERING: Final = ("steering", "throttle")
 """Names of the values of an action if the policy has no action layout."""
 
-_CARD: Final = "card"
-_HASH: Final = "sha256"
-# A file begins with the length of its JSON header.
-_LENGTH_BYTES: Final = 8
-_MAX_HEADER_BYTES: Final = 2**22  # Parsed JSON needs twenty times as much memory.
 MAX_BYTES: Final = 2**28
 """Size of the largest file that is read."""
+
+_CARD: Final = "card"
+_HASH: Final = "sha256"
+_LENGTH_BYTES: Final = 8
+_MAX_HEADER_BYTES: Final = 2**22  # Parsed JSON needs twenty times as much memory.
 _LONGEST: Final = 200  # Longest reason in a message, characters.
 _MAX_MEMBERS: Final = 32  # Limits the work that a forged card can cause.
 
@@ -50,10 +50,7 @@ _MAX_MEMBERS: Final = 32  # Limits the work that a forged card can cause.
 class Framing(msgspec.Struct, frozen=True, kw_only=True):
     """Crop and resolution of the images of a policy.
 
-    Attributes:
-        height: Rows of the reduced image.
-        width: Columns of the reduced image.
-        top: Share of the rows that is cut off at the top, in [0, 1).
+    The share `top` of the rows, in [0, 1), is cut off; `height` and `width` are in pixels.
     """
 
     # Half the resolution of a 160 x 120 image, without the top fifth, in which a camera a few
@@ -78,14 +75,12 @@ class CloneNetwork(msgspec.Struct, frozen=True, kw_only=True):
     """Architecture of a policy that was cloned from demonstrations.
 
     Attributes:
-        framing: Part of the image that the policy sees.
         channels: Filters of each convolution.
         features: Number of features between image and actions.
         eyes: Input of the first layer: "colours" or "edges" of an image; "none" without images.
         nerves: Widths of the layers for the state; () without a state.
         members: Number of networks whose outputs are averaged.
         classes: Actions to choose from; () for continuous actions.
-        class_names: Names of the classes.
         unseen: Names of state values that the policy ignores.
         low: Action for an output of -1; () for -1 each.
         high: Action for an output of 1; () for 1 each.
@@ -127,11 +122,8 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
         env: The env of the training; None for recordings.
         observation: Layout of the observed numbers; None for images alone.
         action: Layout of the actions; None for steering and throttle in [-1, 1] of any vehicle.
-        learner: Name of the learner.
         settings: Settings of the learner; None in an ONNX file.
         steps: Env steps of the training; for a clone, the number of demonstrated steps.
-        seed: Seed of the training.
-        version: Version of Shapechanger.
         identity: Identities of the env and the learner, see `shapechanger.transfer.identities`.
         command: The command that wrote the file; empty in a study, whose `study.json` has it.
         start_log_std: If the training started from another policy, the initial logarithm of the
@@ -224,21 +216,15 @@ def _text(layout: Layout | None) -> str:
 
 
 class Policy(ABC):
-    """A policy of any kind.
-
-    Attributes:
-        card: Provenance of the policy.
-    """
+    """A policy of any kind, with its provenance as `card`."""
 
     card: PolicyCard
 
     @abstractmethod
     def act(self, observations: Any) -> NDArray[Any]:
-        """Return an action for each observation of an env, shape (n, m).
+        """Return actions, shape (n, m), for observations of an env, shape (n, ...).
 
-        Args:
-            observations: Shape (n, ...); for a clone that needs images and a state, a mapping with
-                `image` and `state`.
+        For a clone that needs images and a state, they are a mapping with `image` and `state`.
         """
 
     def tensors(self) -> dict[str, NDArray[Any]]:
@@ -259,7 +245,7 @@ class Policy(ABC):
 
 
 class OnnxPolicy(Policy):
-    """A trained policy from an ONNX file; its network, `run`, does not need PyTorch."""
+    """A trained policy from an ONNX file, which does not need PyTorch."""
 
     def __init__(self, card: PolicyCard, run: Network) -> None:
         self.card, self._run = card, run
@@ -377,8 +363,7 @@ def read_network(path: Path) -> tuple[PolicyCard, Network]:
     with translate_errors(ImportError, to=lambda _: MissingExtra("onnxruntime", "onboard")):
         runtime: Any = import_module("onnxruntime")
     options = runtime.SessionOptions()
-    # More threads do not make a small network faster.
-    options.intra_op_num_threads = 1
+    options.intra_op_num_threads = 1  # More threads do not make a small network faster.
     options.log_severity_level = 4  # Errors are raised instead of being logged.
     session = runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     facts = session.get_modelmeta().custom_metadata_map
@@ -399,10 +384,6 @@ def export_network(
     The arguments of its `forward` are the inputs in their order. Each value of `inputs` is an
     example of shape (2, ...), whose first axis may have any length in the file. The last key of the
     card's `shapes` is the name of the output. `facts` are additional metadata.
-
-    Raises:
-        MissingExtra: If onnx or onnxscript is not installed.
-        OutputError: If the file cannot be written.
     """
     with translate_errors(ImportError, to=lambda _: MissingExtra("onnxscript", "onnx")):
         operators: Any = import_module("onnxscript").opset18

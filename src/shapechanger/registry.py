@@ -19,10 +19,8 @@ _Part = TypeVar("_Part")
 class Registry(Generic[_Part]):
     """Parts of one kind, keyed by name.
 
-    Args:
-        kind: Noun for a part, for messages, such as "method".
-        group: Group of the entry points, such as "shapechanger.methods".
-        shipped: `module:attribute` below `shapechanger` of each shipped part, keyed by name.
+    `shipped` are the shipped parts as `module:attribute` below `shapechanger`, keyed by name. A
+    package adds parts as entry points of `group`, such as `shapechanger.methods`.
     """
 
     def __init__(self, kind: str, group: str, shipped: dict[str, str]) -> None:
@@ -32,12 +30,7 @@ class Registry(Generic[_Part]):
         self._registered: dict[str, _Part] = {}
 
     def register(self, name: str, part: _Part) -> None:
-        """Register a class as a part.
-
-        Raises:
-            StudyError: If the name is empty, is already in use, or contains other characters than
-                letters, digits, - and _.
-        """
+        """Register a class as a part, by a new name of letters, digits, - and _."""
         title = getattr(part, "__name__", repr(part))
         if not name.replace("-", "").replace("_", "").isalnum():
             raise StudyError(
@@ -63,11 +56,7 @@ class Registry(Generic[_Part]):
         return frozenset(self.names()) - self._places.keys()
 
     def load(self, name: str) -> _Part:
-        """Return a part by its name, or by `module:name` to import a module that registers it.
-
-        Raises:
-            UnknownName: If there is no such part or module.
-        """
+        """Return a part by its name, or by `module:name` to import a module that registers it."""
         module, _, own = name.rpartition(":")
         if module:
             try:

@@ -16,10 +16,9 @@ from shapechanger.policy import load_policy
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.plan import Run, TransferTask
-from shapechanger.transfer.runs import load_result, perform_run
+from shapechanger.transfer.runs import load_result, perform_run, require_planned
 from shapechanger.transfer.study import Study, make_plan, run_study
 from shapechanger.transfer.suite import merge_study, open_study_folder
-from shapechanger.transfer.versions import require_planned
 from tests.demos.exchange.small import snapshot
 from tests.transfer.own_robot import (
     METHOD,

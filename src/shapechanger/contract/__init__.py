@@ -1,7 +1,6 @@
 """The promises of envs to learners, studies and recorders, and of worlds to simulated hardware.
 
-`env_ref` identifies an env as a value, reads its traits and defines performance metrics.
-`world` is the interface of every world that a robot's twin senses and moves in. `plan` and `limits`
-are the numbers and pure functions of a robot's limits, for its guard and for simulations. `testing`
-is the exam of every env; begin there to write a new one.
+`env_ref` identifies an env as a value and defines performance metrics; `testing` is the exam of
+every env. `world` is the interface of the worlds of simulated robots. `plan` and `limits` define
+the limits of a robot, for its guard and for simulations.
 """

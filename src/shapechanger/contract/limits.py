@@ -36,16 +36,10 @@ def clipped(action: ActionPlan, value: float) -> bool:
 
 
 def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> float:
-    """Return the next value on the way to the target.
+    """Return the next value between `now`, which was set `elapsed_s` seconds ago, and the target.
 
     The slew limits the change away from rest and towards rest. A value that changes to the other
     side of rest stays at rest for one step. A three-level motor has no slew.
-
-    Args:
-        action: The action.
-        now: Current value.
-        aim: Target value.
-        elapsed_s: Time since the current value was set, s.
     """
     is_away, will_be_away = now - action.rest, aim - action.rest
     if is_away < 0.0 < will_be_away or will_be_away < 0.0 < is_away:
@@ -62,9 +56,8 @@ def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> floa
 class Duty:
     """Conversion of an output value to a duty cycle, the share of time that a motor is on.
 
-    Attributes:
-        start: Smallest duty that moves the motor, 0 to 1; values just above 0 are mapped to it.
-        full: Duty at a value of 1, above `start` and at most 1.
+    Values just above 0 become `start`, the smallest duty that moves the motor, and 1 becomes
+    `full`: 0 <= start < full <= 1.
     """
 
     start: float = 0.0
@@ -116,25 +109,20 @@ class Bump:
 
 
 class Stall:
-    """Detect a push without motion, and block further pushing in this direction.
+    """Detect a push above `threshold` without motion for `after_s` seconds, 0 to disable.
 
-    The block ends as soon as a command requests rest or the other direction.
+    Further pushing in this direction is blocked until a command requests rest or the other
+    direction.
 
     Attributes:
         way: Sign of the push that stalled; 0 for none.
         watches: Whether a measured speed is available.
-
-    Args:
-        after_s: Longest push without motion, s; 0 to disable.
-        threshold: Push above which motion is expected.
     """
 
     def __init__(self, after_s: float, threshold: float) -> None:
         self._after_ns = round(after_s * 1e9)
         self._threshold = threshold
-        self._pushing = 0
-        self._since_ns = 0
-        self.way = 0
+        self._pushing = self._since_ns = self.way = 0
         self.watches = False
 
     def sense(self, quantities: Mapping[str, float], push: float, now_ns: int) -> None:
@@ -154,15 +142,12 @@ class Stall:
 
 
 class Propulsion:
-    """Forward component of the actions; positive is forward.
-
-    Attributes:
-        forward: Indices of the actions that push the robot forward or backward.
-    """
+    """Forward component of the actions; positive is forward."""
 
     def __init__(self, actions: Sequence[ActionPlan]) -> None:
         self._actions = actions
-        # The steering of a tank propels too, but never forward.
+        # Indices of the actions that push the robot forward or backward. The steering of a tank
+        # propels too, but never forward.
         self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != "steering")
         self._rests = [(i, actions[i].rest) for i in self.forward]
         # Indices of the actions for which the profile states a speed.
@@ -184,13 +169,7 @@ class Propulsion:
 
 
 class MotionReflexes:
-    """Reflexes that block motion if the robot touches, approaches or pushes against an object.
-
-    Attributes:
-        bump: Contacts of the bumpers.
-        stall: Pushes without motion.
-        propulsion: Forward component of the actions.
-    """
+    """Reflexes that block motion if the robot touches, approaches or pushes against an object."""
 
     def __init__(self, plan: GuardPlan) -> None:
         self._actions = plan.actions

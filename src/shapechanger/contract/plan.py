@@ -19,17 +19,12 @@ from msgspec import Meta
 DrivingPart = Literal[
     "wheels", "left track", "right track", "propeller", "left propeller", "right propeller"
 ]
-"""Part that propels the robot."""
-
 Part = Literal["", DrivingPart, "steering", "rudder", "gear", "bed", "joint", "tendon"]
-"""Part that an output may move."""
-
 
 Mix = Annotated[
     dict[str, Annotated[float, Meta(ge=-10, le=10)]],
     Meta(description="a table of numbers from -10 to 10 by name of action"),
 ]
-"""Weight of each action, keyed by its name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,18 +77,10 @@ class ActionPlan:
 
 @dataclass(frozen=True, slots=True)
 class OutputPlan:
-    """One motor, servo or controller, with its weight of each action.
+    """One motor, servo or controller, named such as "left", with a driver such as "hbridge".
 
-    Its value is `offset` plus the weighted sum of the actions, clipped to -1 to 1.
-
-    Attributes:
-        name: Name, such as "left".
-        driver: Name of the driver, such as "hbridge".
-        part: The part that the output moves, such as "wheels" or "left track"; may be empty.
-        mix: Weight of each action.
-        offset: Value if all actions are 0.
-        settings: Settings of the driver, such as pins and pulse widths, with all defaults filled
-            in.
+    Its value is `offset` plus the sum of the actions with the weights `mix`, clipped to -1 to 1.
+    The settings of the driver, such as pins and pulse widths, contain all defaults.
     """
 
     name: str
@@ -106,14 +93,10 @@ class OutputPlan:
 
 @dataclass(frozen=True, slots=True)
 class SensorPlan:
-    """One sensor of the guard.
+    """One sensor of the guard, named such as "bumper", with a driver such as "switch".
 
-    Attributes:
-        name: Name, such as "bumper".
-        driver: Name of its driver, such as "switch".
-        measures: Measured quantity: "speed", "bump", "distance", "imu", "battery",
-            "temperature", "tendons" or "joints".
-        settings: Settings of the driver, with all defaults filled in.
+    It measures "speed", "bump", "distance", "imu", "battery", "temperature", "tendons" or "joints".
+    The settings of the driver contain all defaults.
     """
 
     name: str
@@ -179,12 +162,7 @@ class GuardPlan:
     """Everything that the guard needs.
 
     Attributes:
-        name: Name of the robot.
         actions: The actions of a command, in order.
-        outputs: The outputs that the actions move.
-        sensors: The sensors that the guard reads.
-        limits: Limits beyond which the robot stops by itself.
-        stop: Course of a stop.
         enable_pin: BCM pin that the guard toggles while it runs, for the one-shot circuit that
             keeps the enable line of the motors active; None without it.
         stop_pin: BCM pin of an emergency stop button to ground; None without a button.
@@ -217,12 +195,7 @@ class GuardPlan:
 def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...]:
     """Return the value of each output: its offset plus the weighted sum of the actions, in [-1, 1].
 
-    Args:
-        plan: The robot.
-        actions: One number for each action of the robot, in order.
-
-    Raises:
-        ValueError: If the number of actions is wrong.
+    Raises ValueError if the number of actions is wrong.
     """
     if len(actions) != len(plan.actions):
         names = ", ".join(action.name for action in plan.actions)

@@ -21,13 +21,7 @@ STANDING_RADPS: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Pose of a vehicle seen from above.
-
-    Attributes:
-        x: Position, m.
-        y: Position, m.
-        heading: Angle from the x axis, rad, counter-clockwise.
-    """
+    """Position of a vehicle, m, and its heading from the x axis, rad, counter-clockwise."""
 
     x: float
     y: float
@@ -39,7 +33,6 @@ class Readings:
     """True values of the quantities that sensors on the vehicle measure.
 
     Attributes:
-        pose: Pose of the vehicle.
         speed: Speed along its heading, m/s; backward is negative.
         travelled_m: Distance that the wheels have rolled, m; it decreases while rolling backward.
         acceleration_x: Acceleration along its heading, m/s2.
@@ -89,12 +82,9 @@ class World(Protocol):
         self.place(0)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Simulate the world for a duration.
+        """Simulate the world for `dt_s` seconds.
 
-        Args:
-            dt_s: Duration, s.
-            outputs: Output of each part, such as "wheels", from -1 to 1; None for a part without
-                torque.
+        `outputs` has a value from -1 to 1 for each part, such as "wheels"; None without torque.
         """
         ...
 

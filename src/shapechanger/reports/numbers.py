@@ -41,14 +41,7 @@ def count(value: float) -> str:
 def interval_text(
     value: float | None, low: float | None, high: float | None, *, signed: bool = False
 ) -> str:
-    """Format an estimate with its interval, as in `+0.31 [+0.22, +0.40]`.
-
-    Args:
-        value: The estimate; None if it is undefined.
-        low: Lower end of the interval; None if there is no interval.
-        high: Upper end of the interval; None if there is no interval.
-        signed: Whether numbers above zero get a plus sign.
-    """
+    """Format an estimate with its interval, as in `+0.31 [+0.22, +0.40]`; None if undefined."""
     if value is None:
         return UNDEFINED
     if low is None or high is None:
@@ -94,13 +87,7 @@ def shares_text(counts: Mapping[_Name, int]) -> str:
 
 
 class SeedMean(NamedTuple):
-    """Means over seeds with their t-intervals.
-
-    Attributes:
-        mean: Mean over the seeds, shape (n,).
-        low: Lower end, shape (n,).
-        high: Upper end, shape (n,).
-    """
+    """Means over seeds with the ends of their t-intervals, each of shape (n,)."""
 
     mean: NDArray[np.float64]
     low: NDArray[np.float64]
@@ -110,9 +97,7 @@ class SeedMean(NamedTuple):
 def t_interval(samples: NDArray[np.float64]) -> SeedMean:
     """Student's t-interval of the mean over seeds, mean ± t(0.95, n - 1) · s / sqrt(n).
 
-    Args:
-        samples: One row for each seed, shape (n_seeds, n). One seed has no interval: both ends are
-            its mean.
+    The samples have the shape (n_seeds, n). One seed has no interval: both ends are its mean.
     """
     from scipy import stats  # Slow to import, and not needed to format numbers.
 
@@ -126,11 +111,7 @@ def t_interval(samples: NDArray[np.float64]) -> SeedMean:
 
 
 def spread_text(values: NDArray[np.float64]) -> str:
-    """Format the mean of one number for each seed with its t-interval, as in `950 [900, 1,000]`.
-
-    Args:
-        values: Shape (n_seeds,).
-    """
+    """Format the mean of values, (n_seeds,), with its t-interval, as in `950 [900, 1,000]`."""
     if values.size == 1:
         return interval_text(float(values[0]), None, None)
     mean, low, high = (float(x[0]) for x in t_interval(values[:, np.newaxis]))
@@ -138,12 +119,9 @@ def spread_text(values: NDArray[np.float64]) -> str:
 
 
 def share_text(shares: NDArray[np.float64]) -> str:
-    """Format the mean share over seeds with its t-interval, as in `85 % [71 %, 99 %]`.
+    """Format the mean of shares, (n_seeds,), each from 0 to 1, as in `85 % [71 %, 99 %]`.
 
-    The interval is clipped to 0 and 1.
-
-    Args:
-        shares: Share of each seed, 0 to 1, shape (n_seeds,); if empty, the text is empty.
+    The t-interval over seeds is clipped to 0 and 1. Without shares, the text is empty.
     """
     if shares.size == 0:
         return ""

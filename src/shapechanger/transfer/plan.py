@@ -72,7 +72,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         versions: Version of each package that the numbers depend on; a study cannot be resumed
             with other versions.
         identity: Identities of source, target, learner and methods, see
-            `shapechanger.transfer.versions`; a study cannot be resumed with other identities.
+            `shapechanger.transfer.runs`; a study cannot be resumed with other identities.
 
     Raises:
         StudyError: If there are fewer than two seeds, scratch or a second arm is missing, or the

@@ -1,6 +1,7 @@
-"""The runs of a study, each in its own process, and their results.
+"""The runs of a study, each in its own process, their results, and the identities of their parts.
 
-All random numbers of a run derive from the seed of the run.
+All random numbers of a run derive from the seed of the run. The keys of identities are "source",
+"target", "learner", and "method NAME" for each arm.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import math
 import pkgutil
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final
@@ -16,8 +18,16 @@ import msgspec
 
 from shapechanger.errors import CorruptStudy, ForeignStudy, StudyError
 from shapechanger.files import append_line, make_folder, read_json, write_json
-from shapechanger.identity import Identity
+from shapechanger.identity import identify_code
 from shapechanger.transfer.executor import ReportSteps, use_one_thread
+from shapechanger.transfer.identities import (
+    LEARNER,
+    NOTHING,
+    Identities,
+    identify,
+    identify_learner,
+    known,
+)
 from shapechanger.transfer.learners import Learner, LearnerSettings, SharedFile
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
@@ -27,10 +37,10 @@ from shapechanger.transfer.learners.evaluation import (
 )
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
-from shapechanger.transfer.versions import differences, parts_of, require_planned
 
 _RESULT: Final = "run.json"
 _CURVE: Final = "curve.jsonl"
+_METHOD: Final = "method "
 
 
 class RunResult(msgspec.Struct, frozen=True):
@@ -50,7 +60,7 @@ class RunResult(msgspec.Struct, frozen=True):
     curve: tuple[Evaluation, ...]
     wall_s: float
     device: str = ""
-    identity: dict[str, Identity] = {}
+    identity: Identities = {}
 
 
 def learner_of(name: str, settings: LearnerSettings) -> Learner[Any]:
@@ -119,7 +129,7 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
     if run.kind in NO_SKILL:
         on_evaluation(_evaluate_unskilled(plan, run, learner))
     else:
-        part = f"method {run.kind}"
+        part = f"{_METHOD}{run.kind}"
         context = MethodRun(
             source=plan.task.source,
             target=plan.target_of(run),
@@ -162,3 +172,66 @@ def _evaluate_unskilled(plan: Plan, run: Run, learner: Learner[Any]) -> Evaluati
         seed, space = plan.seed_of(run), envs[0].action_space
         act = random_actions(space, seed) if run.kind == "random" else zero_actions(space)
         return evaluate(act, envs, seed, episodes=plan.settings.eval_episodes)
+
+
+def identities_of_code(settings: object, arms: Sequence[str] = ()) -> Identities:
+    """Return the identities of a learner and of methods."""
+    methods = {f"{_METHOD}{arm}": identify_code([arm], load_method(arm)) for arm in arms}
+    return known({LEARNER: identify_learner(settings), **methods})
+
+
+def parts_of(plan: Plan, run: Run) -> Identities:
+    """Return the identities that a run depends on."""
+    parts = {"target"} if run.kind in NO_SKILL else {"target", LEARNER, f"{_METHOD}{run.kind}"}
+    if run.kind == SOURCE:
+        parts = {"source", LEARNER}
+    elif run.kind not in NO_SKILL and load_method(run.kind).uses_source:
+        parts.add("source")
+    return {part: each for part, each in plan.identity.items() if part in parts}
+
+
+def changes_between(old: Plan, new: Plan) -> str:
+    """Describe how the common parts of two plans differ; empty if they are equal."""
+    mine, theirs = ({"source": p.task.source, "target": p.task.target} for p in (new, old))
+    common = [(f"{mine[a]}", a, b) for a in mine for b in theirs if mine[a] == theirs[b]]
+    if (new.learner, new.settings) == (old.learner, old.settings):
+        common.append((f"the learner {new.learner}", LEARNER, LEARNER))
+    arms = [arm for arm in new.arms if arm in old.arms]
+    common += [(f"the method {arm}", _METHOD + arm, _METHOD + arm) for arm in arms]
+    found: dict[str, str] = {}
+    for title, part, other in common:
+        before, after = old.identity.get(other, NOTHING), new.identity.get(part, NOTHING)
+        if before != after:
+            found[title] = before.changes_to(after)
+    return "; ".join(f"{title}: {text}" for title, text in found.items())
+
+
+def differences(plan: Plan, old: Identities, new: Identities) -> str:
+    """Describe how identities of a plan's parts differ; empty if they are equal."""
+    titles = {"source": f"{plan.task.source}", "target": f"{plan.task.target}"}
+    changed = {
+        titles.get(part, f"the {part}"): old.get(part, NOTHING).changes_to(new.get(part, NOTHING))
+        for part in sorted({*old, *new})
+    }
+    return "; ".join(f"{title}: {text}" for title, text in changed.items() if text)
+
+
+def require_planned(plan: Plan, run: Run) -> None:
+    """Refuse a run if its robot, task, method or learner differs from the plan in this process.
+
+    A file may be edited while a study runs, and another node of a cluster may have another version.
+    """
+    parts = parts_of(plan, run)
+    arms = [run.kind] if _METHOD + run.kind in parts else []
+    code = identities_of_code(plan.settings, arms)
+    found = {part: each for part, each in code.items() if part in parts}
+    for part, ref in (("source", plan.task.source), ("target", plan.task.target)):
+        if part in parts:
+            # Do not connect to a robot a second time.
+            is_robot = plan.exclusive and part == "target"
+            found[part] = parts[part] if is_robot else identify(ref)
+    if text := differences(plan, parts, found):
+        raise ForeignStudy(
+            f"An env or code of this study has changed since its plan. {text}. Restore it and run "
+            "the same command again, or start again with another --out."
+        )

@@ -44,8 +44,14 @@ from shapechanger.transfer.plan import (
     read_plan,
 )
 from shapechanger.transfer.references import reference_of
-from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
-from shapechanger.transfer.versions import changes_between, identities_of_code
+from shapechanger.transfer.runs import (
+    RunResult,
+    changes_between,
+    identities_of_code,
+    learner_of,
+    load_result,
+    perform_run,
+)
 
 STUDY_FILE: Final = "study.json"
 

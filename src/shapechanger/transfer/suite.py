@@ -22,9 +22,8 @@ from shapechanger.transfer.metrics.curves import LearningCurves
 from shapechanger.transfer.metrics.intervals import Estimate
 from shapechanger.transfer.metrics.measures import steps_to_reach
 from shapechanger.transfer.plan import PLAN_FILE, SOURCE, Plan, read_plan
-from shapechanger.transfer.runs import load_result
+from shapechanger.transfer.runs import changes_between, load_result
 from shapechanger.transfer.study import Study, claim_folder
-from shapechanger.transfer.versions import changes_between
 
 _OF_TARGET: Final = ("random", "zero-action", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
