@@ -170,8 +170,8 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     push = ("policies", "push", POLICY, "ada/new")
     assert "no model ada/none on the Hub, or it is private" in refused(run(*pull))
     assert "hf auth login" in refused(run(*pull, token=""))
-    assert "requires a login" in refused(run(*push, token=""))
-    assert "forbids this for ada/new" in refused(run(*push, token=READER))
+    for token in ("", READER):
+        assert "forbids this for ada/new" in refused(run(*push, token=token))
     # A token that is invalid in an HTTP header must not be part of the error.
     answer = run(*push, token="hf_söcret")
     assert "söcret" not in refused(answer)
@@ -246,7 +246,7 @@ def test_a_pull_that_is_too_large_or_interrupted_leaves_nothing(
     assert run("demos", "push", tmp_path / "data", "ada/drive")[0] == 0
     hub.cut["shapechanger.json"] = 10
     cut = ("demos", "pull", "ada/drive", "--out", tmp_path / "out")
-    assert "connection to the Hub failed" in refused(run(*cut))
+    assert "The Hub failed for ada/drive" in refused(run(*cut))
     hub.cut.clear()
     hub.requests.clear()
     pull = ("demos", "pull", "ada/drive", "--out", tmp_path / "out", "--max-gib", "1e-9")

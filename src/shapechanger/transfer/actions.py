@@ -1,10 +1,8 @@
 """Actions of learners, from -1 to 1, and actions of envs, in the units of their actuators.
 
-A learner explores with the same deviation in every action, so it learns nothing where an actuator
-takes ±200 N·m, and overshoots where one takes ±0.1 rad. Every learner therefore acts from -1 to 1.
-Everything else is in the units of the env: layouts, body maps, `TrainedPolicy.act`, exported
-policies, recordings and evaluations. Only a model of Stable-Baselines3 uses the scaled actions:
-`model.action_space` is their range, and the action layout is the range of the env's actions.
+A learner explores with the same deviation in every action, which is too small for an actuator of
+±200 N·m and too large for one of ±0.1 rad. Every learner therefore acts from -1 to 1. Layouts, body
+maps, `TrainedPolicy.act`, exported policies, recordings and evaluations use the units of the env.
 """
 
 from __future__ import annotations
@@ -24,11 +22,8 @@ _Array = NDArray[np.float64]
 class ActionScale(NamedTuple):
     """The scale of a model's actions: action of the env = middle + half * action of the model.
 
-    Attributes:
-        middle: Shape (n,), in the unit of each action.
-        half: Shape (n,), above zero; in the unit of each action.
-        low: Smallest actions of the env, shape (n,); in the unit of each action.
-        high: Largest actions of the env, shape (n,); in the unit of each action.
+    Each array has the shape (n,) and the unit of each action; `half` is above zero. Actions of the
+    env are clipped to `low` and `high`.
     """
 
     middle: _Array

@@ -30,16 +30,10 @@ OnProgress = Callable[[str, int, bool], None]
 
 @dataclass(frozen=True)
 class Job:
-    """A function call to run in a separate process.
+    """A call of a module-level function, with `arguments` and a `ReportSteps`, in a process.
 
-    Attributes:
-        name: Unique name of the job.
-        function: Called with `arguments` and a `ReportSteps`; a module-level function, so that
-            another process can import it.
-        arguments: Arguments of the function; must be picklable.
-        after: Names of the jobs that must end before this one starts.
-        attempts: Maximum number of attempts if the job's process is lost; a job that raises is not
-            repeated.
+    The job starts when the jobs named in `after` have ended. If its process is lost, the job is
+    repeated up to `attempts` times; a job that raises is not repeated.
     """
 
     name: str
@@ -55,21 +49,17 @@ the failure or None, and for "lost" how the process was lost."""
 
 
 class Executor:
-    """Runs jobs in the order of their dependencies.
+    """Runs jobs in the order of their dependencies; subclasses define where jobs run.
 
     If a job fails, only the jobs that need its result are skipped. A job is repeated if its process
-    is lost. Subclasses define where jobs run.
+    is lost.
     """
 
     # Maximum number of jobs that run at the same time; None for no limit.
     _most: int | None = None
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs in order of their dependencies.
-
-        Args:
-            jobs: The jobs.
-            on_progress: Called with the progress of each job.
+        """Run all jobs in the order of their dependencies.
 
         Raises:
             FailedRuns: If jobs have failed; all jobs that do not depend on them are complete.
@@ -188,11 +178,8 @@ class Serial(Executor):
 class Processes(Executor):
     """Runs jobs in worker processes of this machine, which end with their parent.
 
-    Processes are spawned, not forked: a script that uses this class must guard its entry point with
-    `if __name__ == "__main__":`.
-
-    Args:
-        workers: Number of processes; None for one per core.
+    A script that uses this class must guard its entry point with `if __name__ == "__main__":`,
+    because processes are spawned. `workers` is their number; None for one per core.
     """
 
     def __init__(self, workers: int | None = None) -> None:

@@ -28,19 +28,10 @@ from shapechanger.transfer.transplant.model import check_supported
 
 
 def export_onnx(policy: TrainedPolicy, path: Path) -> None:
-    """Write a policy as ONNX.
+    """Write a policy as ONNX; StudyError unless it is an `MlpPolicy` of PPO, SAC or TQC.
 
     The input `observation` is float64 of shape (n, observations), as the env returns it. The output
     `action` is float32 of shape (n, actions), in the units of the env.
-
-    Args:
-        policy: The policy.
-        path: The file, such as `ant.onnx`.
-
-    Raises:
-        MissingExtra: If onnx or onnxscript is not installed.
-        StudyError: If the policy's network is not the `MlpPolicy` of PPO, SAC or TQC.
-        OutputError: If the file cannot be written.
     """
     try:
         check_supported(policy.model)
@@ -52,17 +43,9 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
 def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, path: Path) -> None:
     """Write a policy of limbs as ONNX for one body, whose description is constant in the graph.
 
-    Args:
-        policy: The policy.
-        env: The env of the body.
-        ref: The same env, for the card.
-        path: The file.
-
     Raises:
-        MissingExtra: If onnx or onnxscript is not installed.
         TransplantError: If the body belongs to another family than the policy's.
         StudyError: If the body has more limbs than the policy has room for.
-        OutputError: If the file cannot be written.
     """
     settings: Any = policy.card.settings
     rows = fitted(env, policy.card.layouts[0], settings.room).rows

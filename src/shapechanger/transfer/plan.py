@@ -18,7 +18,6 @@ from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.methods import load_method
 
 PLAN_FILE: Final = "plan.json"
-"""Name of the file of a plan in the folder of its study."""
 ARMS: Final = ("scratch", "zero-shot", "fine-tune")
 """Arms that are available for every pair of envs."""
 SOURCE: Final = "source"
@@ -33,12 +32,7 @@ _MIN_SEEDS: Final = 2
 
 
 class TransferTask(msgspec.Struct, frozen=True):
-    """The two envs of a transfer.
-
-    Attributes:
-        source: The env that the policy is trained in.
-        target: The env that the policy is transferred to.
-    """
+    """The two envs of a transfer: a policy is trained in the source and moved to the target."""
 
     source: EnvRef
     target: EnvRef
@@ -48,12 +42,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     """Everything that determines the numbers of a study.
 
     Attributes:
-        task: Source and target.
-        body_map: Map between the layouts of source and target.
         measure: Quantity by which runs are compared: the name of a measure of the target, of one of
             its reward terms, or "return".
-        unit: Unit of the measure.
-        learner: Name of the learner.
         settings: Settings of the learner, the same in every arm.
         steps: Target steps of each run of scratch and fine-tune.
         source_steps: Training steps of each source policy.
@@ -183,9 +173,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 class Run(msgspec.Struct, frozen=True):
     """One training or one evaluation, which is one sample in the statistics.
 
-    Attributes:
-        kind: Name of a method, "source", "random" or "zero-action".
-        index: Index of the run's seed, from 0.
+    The kind is a method, "source", "random" or "zero-action"; the index is that of the seed.
     """
 
     kind: str

@@ -35,11 +35,8 @@ _ray: Any = ray
 class RayCluster(Executor):
     """Runs jobs on the nodes of a Ray cluster, one job per core.
 
-    If the worker or the node of a job is lost, the job is repeated on another worker.
-
-    Args:
-        address: Address of a running cluster, such as `10.0.0.1:6379`, or "auto" for this machine's
-            cluster; None to start Ray on this machine for the duration of the study.
+    The address is such as `10.0.0.1:6379`, or "auto" for this machine's cluster; None starts Ray on
+    this machine for the duration of the study.
     """
 
     def __init__(self, address: str | None = None) -> None:

@@ -47,8 +47,6 @@ class RunResult(msgspec.Struct, frozen=True):
     """Result of a run.
 
     Attributes:
-        run: The run.
-        seed: Seed of the run.
         curve: Evaluations of the run, in the order of their steps.
         wall_s: Duration, s; the only value here that is not reproducible.
         device: The device that trained: "CPU", or the name of a GPU; empty without training.

@@ -32,9 +32,8 @@ once ("on-policy") or kept in a replay buffer ("off-policy"); callbacks of Stabl
 demonstrations; many bodies at once; worlds on a device."""
 
 
-def ignore(evaluation: Evaluation) -> None:
+def ignore(_: Evaluation) -> None:
     """Discard an evaluation; as `on_evaluation`, it skips evaluations during training."""
-    del evaluation
 
 
 class LearnerSettings:
@@ -69,14 +68,7 @@ class LearnerSettings:
 
     @classmethod
     def from_builtins(cls, value: Any) -> LearnerSettings:
-        """Read settings of any kind, see `shapechanger.files.read_json`.
-
-        Args:
-            value: A table with the kind as `type`.
-
-        Raises:
-            ValueError: If there is no such kind, or a value is wrong.
-        """
+        """Read settings from a table with their kind as `type`; ValueError if they are wrong."""
         table: dict[str, Any] = msgspec.convert(value, dict[str, Any])
         return msgspec.convert(table, LEARNERS.load(str(table.get("type", ""))))
 
@@ -93,15 +85,7 @@ class LearnerSettings:
         return f"every {self.eval_every:,} steps."
 
     def require_budget(self, steps: int, which: str = "") -> None:
-        """Refuse a budget that ends before the first evaluation.
-
-        Args:
-            steps: The budget.
-            which: "target" or "source", if there are two budgets.
-
-        Raises:
-            StudyError: If the budget is smaller than `eval_every`.
-        """
+        """Raise StudyError for a budget, "target" or "source", of less than `eval_every` steps."""
         if steps < self.eval_every:
             budget = f"{steps} {which} steps" if which else f"{steps} steps"
             raise StudyError(
@@ -144,16 +128,7 @@ class Learner(Generic[_Settings]):
         return "CPU"
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
-        """Refuse an env that the learner cannot train in.
-
-        Args:
-            env: The env.
-            traits: Properties of the env.
-
-        Raises:
-            StudyError: If the env does not fulfil a requirement of the learner.
-            SpaceMismatch: If the env's spaces do not fit its layouts.
-        """
+        """Raise StudyError or SpaceMismatch for an env that the learner cannot train in."""
         raise NotImplementedError
 
     def train(
@@ -177,33 +152,17 @@ class Learner(Generic[_Settings]):
             seed: Seed of the training.
             start: A source policy to start from; None for a new policy.
             body_map: Map between the bodies of `start` and `env`.
-            on_evaluation: Called with each evaluation; `ignore` if no callback is needed.
+            on_evaluation: Called with each evaluation; `ignore` to skip evaluations.
             on_steps: Called with the number of steps done.
-
-        Raises:
-            StudyError: If the training diverges.
         """
         raise NotImplementedError
 
     def evaluation_envs(self, env: EnvRef) -> list[gym.Env[Any, Any]]:
-        """Make the envs in which the learner's policies are evaluated.
-
-        Args:
-            env: The env.
-
-        Returns:
-            One env for each episode; a single env if only one instance can exist.
-        """
+        """Make the envs of an evaluation: one for each episode, or the only possible instance."""
         return evaluation_envs(env, self.settings.eval_episodes, self.settings.episode_limit)
 
     def evaluate(self, env: EnvRef, policy: Any, body_map: BodyMap) -> Evaluation:
-        """Evaluate a source policy in another env without training it.
-
-        Args:
-            env: The env.
-            policy: The policy.
-            body_map: Map between the two bodies.
-        """
+        """Evaluate a source policy in another env, through a body map, without training it."""
         raise NotImplementedError
 
     def load(self, path: Path) -> Any:
@@ -211,9 +170,5 @@ class Learner(Generic[_Settings]):
         raise NotImplementedError
 
     def origin(self, path: Path) -> PolicyCard:
-        """Read the card of a stored policy that this learner can use as a source.
-
-        Raises:
-            PolicyError: If another kind of learner trained it.
-        """
+        """Read the card of a source policy; raise PolicyError if another learner trained it."""
         raise NotImplementedError

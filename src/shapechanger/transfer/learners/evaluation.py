@@ -35,10 +35,9 @@ Act = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 class Evaluation(msgspec.Struct, frozen=True):
-    """Result of evaluating a policy after a number of training steps.
+    """Result of evaluating a policy after `steps` env steps of training in this env.
 
     Attributes:
-        steps: Env steps of training in this env before the evaluation.
         mean_return: Mean undiscounted return over the episodes.
         mean_length: Mean length of the episodes, in steps.
         terms: Mean sum over an episode of each reward term that the env reports.
@@ -58,11 +57,7 @@ class Evaluation(msgspec.Struct, frozen=True):
     standing: float | None = None
 
     def value(self, measure: str) -> float:
-        """Return the value of a measure, or the sum of a reward term.
-
-        Raises:
-            UnknownName: If the evaluation contains no measure or term of this name.
-        """
+        """Return the value of a measure, or the sum of a reward term."""
         known = {RETURN.name: self.mean_return, **self.measures, **self.terms}
         if measure not in known:
             raise UnknownName("measure", measure, known)

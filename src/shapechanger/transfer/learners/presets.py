@@ -88,7 +88,7 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Lear
 
     Raises:
         UnknownName: If there is no such learner, or it has no such setting.
-        StudyError: If a value is of the wrong type, or impossible, or the file cannot be read.
+        StudyError: If a value is wrong, or the file cannot be read.
     """
     if learner.endswith(".toml"):
         return _read_learner(Path(learner), changed)

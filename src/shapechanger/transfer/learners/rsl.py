@@ -52,16 +52,8 @@ class RslVecEnv(RslEnvs):
 
     Observations are in the group `policy`. A world whose episode has ended starts again in the same
     step, and `time_outs` is true for worlds whose episode ended only because of the time limit.
-    Actions are clipped to the range from -1 to 1, as in Stable-Baselines3.
-
-    Args:
-        envs: The worlds; they are reset.
-        seed: Seed of the first world; None for a random seed.
-        rows: The `DeviceRows` of the worlds for a policy of limbs, which observes rows and returns
-            a number from -1 to 1 for each limb; None for the body's observations and actions.
-
-    Raises:
-        StudyError: If the worlds have several spaces and `rows` is None.
+    Actions are clipped to the range from -1 to 1, as in Stable-Baselines3. `rows` are `DeviceRows`
+    for a policy of limbs, or None for the body's observations and actions.
     """
 
     def __init__(self, envs: Any, seed: int | None = None, rows: Any = None) -> None:
@@ -103,13 +95,9 @@ class RslVecEnv(RslEnvs):
         return TensorDict({GROUP: self._observations}, batch_size=[self.num_envs])
 
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
-        """Take one step in each world.
+        """Step each world with actions, (n, num_actions).
 
-        Args:
-            actions: Shape (n, num_actions).
-
-        Returns:
-            Observations, rewards, whether each episode has ended, and extras with `time_outs`.
+        Returns observations, rewards, whether each episode has ended, and extras with `time_outs`.
         """
         moved: Any = actions.clamp(-1.0, 1.0)
         if self._rows is not None:

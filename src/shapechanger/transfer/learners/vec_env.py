@@ -25,13 +25,8 @@ class ThreadVecEnv(DummyVecEnv):
 
     As in `DummyVecEnv`, an env whose episode has ended is reset in the same step. Its info then
     contains the last observation as `terminal_observation`. `TimeLimit.truncated` in every info is
-    true if only the time limit ended the episode. Rewards are float32.
-
-    Args:
-        env_id: A registered id.
-        num_envs: Number of envs.
-        threads: Number of threads, see `shapechanger.make_vec`.
-        **arguments: All other arguments of `shapechanger.make_vec`.
+    true if only the time limit ended the episode. Rewards are float32. Other arguments are passed
+    to `shapechanger.make_vec`.
     """
 
     def __init__(
@@ -94,11 +89,7 @@ class ScaledActions(VecEnvWrapper):
         return self.venv.reset()
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Start a step.
-
-        Args:
-            actions: Shape (envs, n), from -1 to 1.
-        """
+        """Start a step with actions from -1 to 1, shape (envs, n)."""
         self.venv.step_async(self._scale.to_env(actions))
 
     def step_wait(self) -> Any:

@@ -24,11 +24,7 @@ from shapechanger.transfer.limbs.rows import LimbRows
 
 
 class DeviceRows:
-    """Map between observations and actions of `shapechanger.make_vec(backend="warp")` and rows.
-
-    If a body has fewer limbs than others, its last rows are empty, so that one tensor has the rows
-    of all worlds.
-    """
+    """Map between observations and actions of `shapechanger.make_vec(backend="warp")` and rows."""
 
     def __init__(self, envs: Any, each: Sequence[LimbRows]) -> None:
         self.room = each[0].room
@@ -48,11 +44,7 @@ class DeviceRows:
         return self._gathered(parts)
 
     def actions(self, limbs: Tensor) -> Tensor | list[Tensor]:
-        """Return the actions of all worlds for the `step` of the vector env.
-
-        Args:
-            limbs: A number from -1 to 1 for each limb, shape (n, room).
-        """
+        """Return the actions of all worlds for numbers from -1 to 1, shape (n, room)."""
         parts = [rows.actions(limbs[numbers]) for numbers, rows in self._batches]
         return parts if self._apart else self._gathered(parts)
 

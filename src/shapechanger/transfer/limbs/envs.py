@@ -29,18 +29,8 @@ from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns, row
 class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
     """An env whose observations are rows of numbers, and whose actions are one number per limb.
 
-    Args:
-        env: An env with a property `tree`, its kinematic tree.
-        room: Number of limbs that have rows; 0 for as many as the body has.
-
-    Attributes:
-        rows: Map from the env's observations to rows, and from limbs' actions to the env's actions.
-        observation_layout: Meaning of each number of the rows.
-        action_layout: Meaning of each action, from -1 to 1.
-
-    Raises:
-        StudyError: If the body has more limbs than `room`, or the env has no tree.
-        LayoutError: If an observation or an action belongs to no part of the body.
+    The env needs a property `tree`, its kinematic tree, whose limbs must not be more than `room`;
+    0 for as many rows as the body has limbs.
     """
 
     def __init__(self, env: gym.Env[Any, Any], room: int = 0) -> None:
@@ -52,27 +42,14 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode.
-
-        Args:
-            seed: Seed of the env.
-            options: Options of the env that do not change the body.
-
-        Raises:
-            StudyError: If an option would change the body.
-        """
+        """Start an episode; options that change the body are refused."""
         if options and "body" in options:
             raise StudyError("A reset cannot change the body behind its rows: make another env.")
         observation, info = self.env.reset(seed=seed, options=options)
         return self.rows.of(observation), info
 
     def step(self, action: NDArray[Any]) -> Any:
-        """Take one step.
-
-        Args:
-            action: A number from -1 to 1 for each limb; actions of limbs without a motor have no
-                effect.
-        """
+        """Take one step with a number from -1 to 1 for each limb, without effect if motorless."""
         observation, *rest = self.env.step(self.rows.actions(action))
         return self.rows.of(observation), *rest
 
@@ -105,17 +82,9 @@ def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
 class LimbVecEnv(DummyVecEnv):
     """Many envs with rows, of bodies that may differ in their number of limbs.
 
-    Envs whose spaces agree are stepped together.
-
-    Args:
-        env: The env; its argument `bodies` lists the bodies, see `each_body`. The envs cycle
-            through them.
-        num_envs: Number of envs, at least one of each body.
-        threads: Number of threads, see `shapechanger.make_vec`.
-        room: Number of limbs that have rows; 0 for as many as the bodies have.
-
-    Raises:
-        StudyError: If there are more bodies than envs, or a body has more limbs than `room`.
+    Envs whose spaces agree are stepped together. The envs cycle through the bodies of `env`, see
+    `each_body`, at least one of each. `room` is the number of limbs that have rows; 0 for as many
+    as the bodies have.
     """
 
     def __init__(

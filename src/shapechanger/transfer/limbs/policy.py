@@ -50,11 +50,7 @@ class LimbNetwork(nn.Module):
             self.decode = nn.Linear(_HIDDEN, 1)
 
     def forward(self, rows: Tensor) -> Tensor:
-        """Return shape (n, limbs) if `per_limb`, else (n,).
-
-        Args:
-            rows: Shape (n, 1 + limbs, width), the trunk's row first.
-        """
+        """Return shape (n, limbs) if `per_limb`, else (n,), for rows of (n, 1 + limbs, width)."""
         limbs = rows[:, 1:]
         description = limbs[..., :DESCRIBED]
         code = self.encode(limbs)
@@ -77,11 +73,7 @@ class PaddedNetwork(nn.Module):
         self.layers = _layers(rows * width, *hidden, rows - 1 if per_limb else 1)
 
     def forward(self, rows: Tensor) -> Tensor:
-        """Return shape (n, limbs) if `per_limb`, else (n,).
-
-        Args:
-            rows: Shape (n, 1 + limbs, width), the trunk's row first.
-        """
+        """Return shape (n, limbs) if `per_limb`, else (n,), for rows of (n, 1 + limbs, width)."""
         out = self.layers(rows.flatten(1))
         return out if self.per_limb else out.squeeze(-1)
 
@@ -132,13 +124,9 @@ class LimbPolicy(ActorCriticPolicy):
         return observation.float().reshape(len(observation), -1, self._width)
 
     def act(self, observations: NDArray[Any]) -> NDArray[np.float32]:
-        """Return mean actions for bodies of any number of limbs.
+        """Return mean actions from -1 to 1, shape (n, limbs), for any number of limbs.
 
-        Args:
-            observations: Rows, flattened, shape (n, (1 + limbs) * width).
-
-        Returns:
-            Shape (n, limbs), from -1 to 1.
+        The observations are flattened rows, shape (n, (1 + limbs) * width).
         """
         with torch.no_grad():
             mean = self.actor_net(self.rows(torch.as_tensor(observations)))

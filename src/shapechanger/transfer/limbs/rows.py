@@ -32,14 +32,7 @@ _SCALES: Final = {"rad/s": 0.1, "m/s": 0.3}
 
 
 class Columns(msgspec.Struct, frozen=True):
-    """The columns of a row, the same for all bodies of a family.
-
-    Attributes:
-        trunk: Names of the trunk's observations.
-        limb: Names of a limb's observations.
-        trunk_numbers: Names of the numbers that describe a trunk.
-        limb_numbers: Names of the numbers that describe a limb.
-    """
+    """Names of the observations of a trunk and of a limb, and of the numbers that describe them."""
 
     trunk: tuple[str, ...]
     limb: tuple[str, ...]
@@ -84,25 +77,14 @@ class LimbRows:
     high: _Floats
 
     def of(self, observation: Any) -> Any:
-        """Return the rows of observations.
+        """Return the rows, shape (..., (room + 1) * width), of observations, (..., observations).
 
-        Args:
-            observation: Shape (..., observations); a tensor if the arrays are tensors of a device.
-
-        Returns:
-            Shape (..., (room + 1) * width): float32, or a tensor.
+        Both are arrays, the rows of float32; or tensors if this map consists of tensors.
         """
         return _single((observation * self.scale + self.offset) @ self.selection + self.constant)
 
     def actions(self, limbs: Any) -> Any:
-        """Return a body's actions, in its units.
-
-        Args:
-            limbs: A number from -1 to 1 for each limb, shape (..., room).
-
-        Returns:
-            Shape (..., actions): float32, or a tensor.
-        """
+        """Return a body's actions, in its units, for numbers from -1 to 1, shape (..., room)."""
         share = 0.5 * (limbs[..., self.actuators] + 1.0)
         return _single(self.low + share * (self.high - self.low))
 

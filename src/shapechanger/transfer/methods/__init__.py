@@ -29,10 +29,6 @@ class MethodRun:
     """One run of a method: the envs, the budget, and functions to train and to evaluate.
 
     Attributes:
-        source: The source env.
-        target: The target env.
-        body_map: Map between the layouts of source and target.
-        learner: The learner.
         steps: Target steps that may be used, a multiple of the steps of an update.
         source_steps: Source steps of a policy that the method trains itself.
         seed: Seed of the run, from which all random numbers must derive.
@@ -83,15 +79,9 @@ class MethodRun:
         on_evaluation: Callable[[Evaluation], None] = ignore,
         **more: Any,
     ) -> Any:
-        """Train a policy with the study's learner.
+        """Train a policy in an env with the study's learner, see `Learner.train`.
 
-        Args:
-            env: The env to train in.
-            steps: Steps of the training.
-            start: A policy of another body to start from; None for a new one.
-            body_map: Map from the body of `start` to the body of `env`.
-            on_evaluation: Called with each evaluation in `env`.
-            **more: Arguments of learners that the method `needs`, such as `callback`.
+        `more` are arguments of the learners that the method `needs`, such as `callback`.
         """
         before = self._done
         if "demonstrations" in self.settings.takes:
@@ -112,12 +102,10 @@ class MethodRun:
         return policy
 
     def fine_tune(self, *, start: Any = None, body_map: BodyMap | None = None, **more: Any) -> Any:
-        """Train on the target from a policy of the source, whose weights are transplanted.
+        """Train on the target from a policy, whose weights are transplanted.
 
-        Args:
-            start: The policy; None for the source policy of this run's seed.
-            body_map: Map from the policy's body to the target; None for the study's map.
-            **more: Other arguments of `train`.
+        The default is the source policy of this run's seed, with the study's map. `more` are
+        arguments of `train`.
         """
         return self.train(
             self.target,
@@ -133,22 +121,13 @@ class MethodRun:
         return self.learner.load(self.policy_file) if self.policy_file.exists() else None
 
     def save(self, policy: Any) -> None:
-        """Save the policy of this run, so that a later failure does not lose its training.
-
-        Args:
-            policy: The policy.
-        """
+        """Save the policy of this run, so that a later failure does not lose its training."""
         if self.identity and hasattr(policy, "carded"):  # The identity is stored in the card.
             policy = policy.carded(identity={**policy.card.identity, **self.identity})
         policy.save(self.policy_file)
 
     def evaluate(self, policy: Any, body_map: BodyMap | None = None) -> Evaluation:
-        """Evaluate a policy on the target, without training it.
-
-        Args:
-            policy: The policy.
-            body_map: Map from the policy's body to the target; None for the study's map.
-        """
+        """Evaluate a policy on the target, through a map or the study's, without training it."""
         return self.learner.evaluate(self.target, policy, body_map or self.body_map)
 
 
@@ -176,16 +155,7 @@ class Method:
     one_family: ClassVar[bool] = False
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Refuse a study in which the method cannot be an arm.
-
-        Args:
-            source: Traits of the source.
-            target: Traits of the target.
-            settings: Settings of the learner.
-
-        Raises:
-            StudyError: If the method cannot be an arm.
-        """
+        """Raise StudyError for a study in which the method cannot be an arm."""
         for takes, text in self.needs:
             if takes not in settings.takes:
                 raise self._lacks(text)
@@ -196,23 +166,12 @@ class Method:
         return StudyError(f"{self.name} needs {needed}: leave this arm out.")
 
     def learn(self, run: MethodRun) -> Any:
-        """Run the method once, and return its policy; None if the method does not train.
-
-        Args:
-            run: The run.
-        """
+        """Run the method once, and return its policy; None if the method does not train."""
         raise NotImplementedError
 
 
 def register(method: type[Method]) -> type[Method]:
-    """Register a method under its name; may be used as a decorator.
-
-    Args:
-        method: The class.
-
-    Raises:
-        StudyError: If the name is empty, taken, or the name of a kind of run.
-    """
+    """Register a method under its name; may be used as a decorator."""
     if method.name in ("source", "random", "zero-action"):
         raise StudyError(
             f"There is already a method {method.name!r}: give {method.__name__} another name."

@@ -52,15 +52,11 @@ class FrozenTrunk(Method):
         return run.fine_tune(callback=_Freeze())
 
 
-class _AtStart(BaseCallback):
-    """Base class of callbacks that only have an effect before the first step."""
+class _Freeze(BaseCallback):
+    """Excludes the hidden layers after the first from the optimiser's steps."""
 
     def _on_step(self) -> bool:
         return True
-
-
-class _Freeze(_AtStart):
-    """Excludes the hidden layers after the first from the optimiser's steps."""
 
     def _on_training_start(self) -> None:
         hidden = cast("Any", self.model.policy).mlp_extractor.policy_net
@@ -102,11 +98,9 @@ class MappedTeacher:
     """The actions of a source policy on the target, through the body map."""
 
     def __init__(self, act: Act, body_map: BodyMap) -> None:
-        self._act = act
-        self._map = body_map
-        self.taught: NDArray[np.bool_] = np.array(
-            [not isinstance(entry.rule, Learn) for entry in body_map.action]
-        )
+        self._act, self._map = act, body_map
+        taught = [not isinstance(entry.rule, Learn) for entry in body_map.action]
+        self.taught: NDArray[np.bool_] = np.array(taught)
 
     def __call__(self, observations: NDArray[Any]) -> NDArray[np.float32]:
         """Return actions of shape (n, target actions) for the target's observations."""
@@ -119,8 +113,7 @@ class _Distillation(BaseCallback):
 
     def __init__(self, teacher: MappedTeacher, action: Layout) -> None:
         super().__init__()
-        self._teacher = teacher
-        self._action = action
+        self._teacher, self._action = teacher, action
         self._seen: list[NDArray[Any]] = []
         self._shown: list[NDArray[np.float32]] = []
         # The teacher's actions for the present observations, which belong to the next step.
@@ -188,14 +181,9 @@ _REPLAY: Final = "a learner with a replay buffer, sac or tqc"
 
 
 class Transitions(NamedTuple):
-    """Transitions of one env, in the order in which they happened.
+    """Transitions of one env in order, each array of shape (n, ...).
 
-    Attributes:
-        observations: Shape (n, observations).
-        actions: Shape (n, actions).
-        rewards: Shape (n,).
-        next_observations: Shape (n, observations).
-        terminated: Shape (n,), whether the task ended; a time limit does not count.
+    `terminated` is true if the task ended; a time limit does not count.
     """
 
     observations: NDArray[np.float64]
@@ -290,11 +278,13 @@ def _mapped(seen: Transitions, body_map: BodyMap) -> Transitions:
     )
 
 
-class _Prefill(_AtStart):
+class _Prefill(BaseCallback):
     def __init__(self, transitions: Transitions, action: Layout) -> None:
         super().__init__()
-        self._transitions = transitions
-        self._action = action
+        self._transitions, self._action = transitions, action
+
+    def _on_step(self) -> bool:
+        return True
 
     def _on_training_start(self) -> None:
         model = cast("Any", self.model)
@@ -327,10 +317,7 @@ class DomainClassifiers(nn.Module):
     def forward(self, seen: Tensor, acted: Tensor, then: Tensor) -> tuple[Tensor, Tensor]:
         """Return log p(target) - log p(source) by each classifier, each of shape (n,).
 
-        Args:
-            seen: Observations, shape (n, k).
-            acted: Actions, shape (n, m).
-            then: Next observations, shape (n, k).
+        Observations and next observations have the shape (n, k), actions (n, m).
         """
         of_action = torch.cat([seen, acted], dim=1).float()
         of_step = torch.cat([of_action, then.float()], dim=1)
@@ -343,12 +330,7 @@ class DomainClassifiers(nn.Module):
         return (of_step - of_action).clamp(-_LARGEST_CORRECTION, _LARGEST_CORRECTION)
 
     def fit(self, source: tuple[Tensor, ...], target: tuple[Tensor, ...]) -> float:
-        """Take one gradient step; return the loss.
-
-        Args:
-            source: (s, a, s') of the source, each of shape (n, ...).
-            target: (s, a, s') of the target, with the same shapes.
-        """
+        """Take one gradient step on (s, a, s'), each of shape (n, ...); return the loss."""
         inputs = [torch.cat(pair) for pair in zip(source, target, strict=True)]
         # Noise prevents overconfident classifiers if the dynamics are nearly deterministic.
         noisy = [one + _NOISE * torch.randn_like(one) for one in inputs]

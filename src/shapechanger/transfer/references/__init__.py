@@ -16,18 +16,12 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import UnknownName
 
 FOLDER: Final = Path(__file__).parent
-"""Folder of the references and of their policies."""
 
 
 class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
-    """Measured values of an env, with their sources.
+    """Measured values of an env, with the learner, env steps and seeds of each training.
 
     Attributes:
-        learner: Name of the learner's settings.
-        steps: Env steps of each training.
-        seeds: Seeds of the trainings.
-        version: Version of Shapechanger.
-        command: The command that measured the reference.
         floor: Values of each measure without skill: for random actions and for the action zero.
         ends: Values of each measure at the end of each training, the mean of its last evaluations.
         policy_seed: Seed of the shipped policy.
@@ -43,11 +37,7 @@ class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
     policy_seed: int
 
     def end(self, measure: str) -> float | None:
-        """Return the mean over the seeds of a measure's value at the end; None if not measured.
-
-        Args:
-            measure: Name of a measure, or "return".
-        """
+        """Return the mean over the seeds of a measure's value at the end; None if not measured."""
         values = self.ends.get(measure)
         return sum(values) / len(values) if values else None
 
@@ -70,11 +60,7 @@ def reference_of(env: EnvRef) -> EnvReference | None:
 
 
 def reference_policy(env_id: str) -> Path:
-    """Return the file of the shipped policy of an env.
-
-    Raises:
-        UnknownName: If no policy ships for the env.
-    """
+    """Return the file of the shipped policy of an env; UnknownName if it has none."""
     if env_id not in load_references():
         raise UnknownName("reference policy", env_id, load_references())
     return FOLDER / f"{env_id.rpartition('/')[2]}.safetensors"

@@ -171,13 +171,9 @@ def _return_limits(study: Study) -> tuple[float, float]:
 
 
 def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
-    """Plot the final value of each arm against a property of the target, one study per value.
+    """Plot the final value of each arm against a property of the target, named `xlabel`.
 
-    A point is one seed; a line joins the means over seeds.
-
-    Args:
-        studies: Studies that differ in the target only, keyed by the property's value.
-        xlabel: Name of the property.
+    The studies are keyed by its value. A point is one seed; a line joins the means over seeds.
     """
     first = next(iter(studies.values()))
 

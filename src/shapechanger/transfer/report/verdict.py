@@ -339,11 +339,7 @@ def devices_of(study: Study) -> dict[str, list[str]]:
 
 
 def machine_text(studies: Iterable[Study]) -> str:
-    """Return the machine of the first study, and the devices on which any study was trained.
-
-    Args:
-        studies: Studies, at least one.
-    """
+    """Return the machine of the first study, and the devices on which any study was trained."""
     first, *rest = studies
     devices = dict.fromkeys(device for study in (first, *rest) for device in devices_of(study))
     learned = f"; learned on {', '.join(devices)}" if devices else ""
