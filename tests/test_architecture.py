@@ -29,7 +29,6 @@ _MODULES = dict(_modules())
 
 
 def test_public_classes_have_distinct_names() -> None:
-    """No two public classes share a name."""
     places: dict[str, list[str]] = {}
     for module, path in _MODULES.items():
         for node in ast.parse(path.read_text()).body:
@@ -39,7 +38,6 @@ def test_public_classes_have_distinct_names() -> None:
 
 
 def test_no_file_is_longer_than_600_lines() -> None:
-    """No module has more than 600 lines."""
     lengths = {module: path.read_text().count("\n") for module, path in _MODULES.items()}
     assert {module: count for module, count in lengths.items() if count > 600} == {}
 

@@ -49,12 +49,9 @@ def test_links_and_blocks(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_names_of_modules_and_functions_exist(page: Path) -> None:
-    """Each dotted name of Shapechanger in inline code leads to something."""
     names = set(re.findall(r"`(shapechanger(?:\.(?!json\b)\w+)+)", page.read_text()))
-    for name in names - {
-        "shapechanger.methods",
-        "shapechanger.learners",
-    }:  # Groups of entry points.
+    groups = {"shapechanger.methods", "shapechanger.learners"}  # Of entry points.
+    for name in names - groups:
         module, found = name, None
         while found is None:
             try:
@@ -66,7 +63,6 @@ def test_names_of_modules_and_functions_exist(page: Path) -> None:
 
 
 def test_the_map_of_the_guide_is_valid() -> None:
-    """The TOML of docs/body-maps.md is valid for Ant and ExtendedAnt."""
     (text,) = blocks(ROOT / "docs" / "body-maps.md", "toml")
     source, target = (env_ref(name).make() for name in ("Ant", "ExtendedAnt"))
     (so, sa), (to, ta) = layouts_of(source), layouts_of(target)

@@ -58,7 +58,7 @@ def test_errors_can_be_pickled(error: ShapechangerError) -> None:
 
 
 def test_a_missing_policy_file_names_the_nearest(tmp_path: Path) -> None:
-    """The nearest file of the same kind is named, or a word that could stand in its place."""
+    """The nearest file of the same kind, or the nearest valid word, is named."""
     for name in ("ant.safetensors", "ant.onnx", "cheetah.safetensors"):
         (tmp_path / name).touch()
     near = no_policy_file(tmp_path / "aant.safetensors")
@@ -66,13 +66,13 @@ def test_a_missing_policy_file_names_the_nearest(tmp_path: Path) -> None:
     assert no_policy_file(Path("referense"), ["reference"]) == (
         "There is no policy file referense; did you mean reference?"
     )
-    assert no_policy_file(tmp_path / "ant.**").endswith("ant.**.")  # No pattern of the glob.
+    assert no_policy_file(tmp_path / "ant.**").endswith("ant.**.")  # "*" is not a wildcard.
     assert no_policy_file(Path("nowhere/x.onnx")) == "There is no policy file nowhere/x.onnx."
 
 
 @given(seed=st.integers(0, LARGEST_SEED), kind=st.sampled_from([int, np.int64, np.uint64]))
 def test_whole_numbers_are_seeds(seed: int, kind: type[int]) -> None:
-    """Python's and NumPy's integers from 0 to 2^32 - 1 are seeds, as the integers that they are."""
+    """Integers of Python and NumPy from 0 to 2^32 - 1 are returned as `int`."""
     found = check_seed(kind(seed), StudyError)
     assert (type(found), found) == (int, seed)
     assert check_seed(2**80 + seed, StudyError, largest=None) == 2**80 + seed
@@ -90,8 +90,8 @@ def test_whole_numbers_are_seeds(seed: int, kind: type[int]) -> None:
         st.sampled_from([2**63, 2**64, np.float64(3.0), np.bool_(1), "3", [3], np.array([1, 2])]),
     )
 )
-def test_nothing_else_is_a_seed(seed: object) -> None:
-    """All else is refused in a sentence with the range and what was given."""
+def test_other_seeds_are_refused(seed: object) -> None:
+    """The message states the range and the given value."""
     with pytest.raises(
         StudyError, match=r"A seed must be a whole number from 0 to 4294967295, got ."
     ):

@@ -16,10 +16,10 @@ import pytest
 _FOLDER = Path(__file__).parents[1] / "examples"
 _EXAMPLES = sorted(_FOLDER.glob("*.py"))
 _FEW = ("--steps", "64")
-# A study needs as many steps as come before its first evaluation.
+# A study needs at least as many steps as there are between two evaluations.
 _ARGUMENTS = dict.fromkeys(("new_method", "study_on_ray"), ("--steps", "4096", "--seeds", "2"))
-# What the last lines of an example say, where they say something worth checking.
-_SAYS = {
+# Parts of the outputs of some examples.
+_OUTPUTS = {
     "own_robot": ("trunk/qw [1]", "longer front legs: "),
     "new_edit": ('[{"edit":"turn_hinge","joint":"ankle_*"', "halfway: "),
     "six_legged_ant": ("ankle_1_5/motor <- ankle_1/motor", "six legs came "),
@@ -46,7 +46,7 @@ def test_an_example_runs(example: Path, tmp_path: Path) -> None:
         cwd=tmp_path,
     )
     assert run.returncode == 0, run.stderr
-    for words in _SAYS.get(example.stem, ()):
+    for words in _OUTPUTS.get(example.stem, ()):
         assert words in run.stdout
 
 
@@ -62,7 +62,7 @@ def test_an_example_is_short(example: Path) -> None:
 @pytest.mark.system
 @pytest.mark.usefixtures("gl")
 def test_the_cells_of_the_notebook_run(tmp_path: Path) -> None:
-    """One after another, and the policy walks best with the shanks that it learned with."""
+    """The policy walks best with the shanks that it was trained with."""
     notebook = json.loads((_FOLDER / "first_transfer.ipynb").read_text())
     cells = ["".join(c["source"]) for c in notebook["cells"] if c["cell_type"] == "code"]
     script = tmp_path / "cells.py"

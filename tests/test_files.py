@@ -11,12 +11,7 @@ import pytest
 
 from shapechanger.envs.suite_file import load_suite
 from shapechanger.errors import CorruptStudy, OutputError, ShapechangerError
-from shapechanger.files import (
-    append_line,
-    read_json,
-    write_atomic,
-    write_json,
-)
+from shapechanger.files import append_line, read_json, write_atomic, write_json
 from shapechanger.finger.paths import from_csv
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Remove, from_json, to_json
@@ -57,7 +52,7 @@ _READERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
 def test_other_encodings_are_read_or_refused(
     tmp_path: Path, name: str, encoding: str, line_end: str
 ) -> None:
-    """A byte-order mark changes nothing, and no encoding gives another content."""
+    """A byte-order mark has no effect, and text in other encodings is refused, never misread."""
     text, read = _READERS[name]
     path = tmp_path / name
     path.write_text(text, encoding="utf-8")
@@ -75,7 +70,7 @@ def test_other_encodings_are_read_or_refused(
 
 
 def test_texts_may_begin_with_a_byte_order_mark() -> None:
-    """Maps and bodies are given as text, in which a file's mark may be left."""
+    """Maps and bodies are given as text, which may contain the mark of a file."""
     layouts = _Z, _Z, _Z, _Z
     text = '[observation]\n"Größe" = "zero"\n'
     assert BodyMap.from_toml(f"\ufeff{text}", *layouts) == BodyMap.from_toml(text, *layouts)
@@ -84,7 +79,7 @@ def test_texts_may_begin_with_a_byte_order_mark() -> None:
 
 
 def test_writes_are_atomic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A write that fails keeps the old file, and leaves no other."""
+    """A failed write keeps the old file, and leaves no partial file."""
     path = tmp_path / "a.json"
     write_atomic(path, b"old")
 
@@ -100,7 +95,6 @@ def test_writes_are_atomic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[1]", b'{"x": "1"}', b"\xff"])
 def test_an_invalid_file_is_named(tmp_path: Path, content: bytes) -> None:
-    """The message has the file and the remedy."""
     path = tmp_path / "run.json"
     write_json(path, {"x": 1})
     assert read_json(path, dict[str, int], "delete it") == {"x": 1}
@@ -109,8 +103,7 @@ def test_an_invalid_file_is_named(tmp_path: Path, content: bytes) -> None:
         read_json(path, dict[str, int], "delete it")
 
 
-def test_lines_are_added_and_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:
-    """Each value is one line; a folder of that name is an error."""
+def test_each_value_is_appended_as_a_line(tmp_path: Path) -> None:
     append_line(tmp_path / "curve", {"a": 1})
     append_line(tmp_path / "curve", {"a": 2})
     assert (tmp_path / "curve").read_text() == '{"a":1}\n{"a":2}\n'

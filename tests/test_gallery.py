@@ -42,7 +42,7 @@ def test_the_gallery_shows_what_the_command_draws() -> None:
 
 
 def test_clips_have_players_on_the_site() -> None:
-    """An image that leads to a clip is a link on code hosts, and a player on the site."""
+    """Linked images of clips become players on the site."""
     shown = on_page_markdown(GALLERY.read_text())
     clips = list(PICTURES.glob("*.webm"))
     assert len(clips) == shown.count("<video ") == shown.count("</video>")

@@ -1,4 +1,4 @@
-"""Which modules count as the user's own, and what their hashes are made of."""
+"""Custom modules and their hashes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _write(folder: Path, **files: str) -> None:
 
 
 def test_modules_count_with_all_that_they_import(folder: Path) -> None:
-    """In functions, from packages with and without `__init__`, relative, and not yet imported."""
+    """Imports count in functions, of packages with and without `__init__`, and relative ones."""
     _write(
         folder,
         om_task="import numpy\nfrom om_pack import tool\ndef f():\n    import om_late\n",
@@ -50,12 +50,12 @@ def test_modules_count_with_all_that_they_import(folder: Path) -> None:
 
 
 def test_installed_modules_and_ours_do_not_count() -> None:
-    """The plan lists versions of installed modules."""
+    """Plans list the versions of installed packages instead."""
     assert own_modules(["numpy", "json", "shapechanger.layout", "no_such_module", ""]) == {}
 
 
 def test_modules_that_are_imported_by_other_means_count(folder: Path) -> None:
-    """A name that a module has got from another is of that one."""
+    """The module that defines a function counts if `importlib` imported it."""
     _write(
         folder,
         om_dynamic="import importlib\nhelp_ = importlib.import_module('om_hidden').help_\n",
@@ -75,21 +75,19 @@ def test_modules_that_are_imported_by_other_means_count(folder: Path) -> None:
         ("X = (\n", False),
     ],
 )
-def test_only_what_an_import_runs_counts(text: str, same: bool, folder: Path) -> None:
-    """Line ends, a mark of the encoding and the part of a script do not."""
+def test_only_code_that_an_import_runs_counts(text: str, same: bool, folder: Path) -> None:
+    """Line ends, a byte-order mark and the block of a script are not hashed."""
     _write(folder, om_one="X = 1\n")
     before = own_modules(["om_one"])
     (folder / "om_one.py").write_bytes(text.encode())
     assert (own_modules(["om_one"]) == before) is same
 
 
-def test_the_modules_of_an_object_are_those_of_its_class_and_its_bases() -> None:
-    """A function, a class and an instance are of the modules that define them."""
+def test_an_object_belongs_to_the_modules_of_its_class_and_bases() -> None:
     names = modules_of(Path(), test_installed_modules_and_ours_do_not_count, sys)
     assert {"pathlib", __name__, "sys"} <= names
 
 
-def test_names_in_arguments_name_modules() -> None:
-    """`module:Name` does, and texts that only have a colon do not."""
+def test_only_texts_like_module_and_name_name_modules() -> None:
     texts = ["om_a:B", "om.c:d-e", "note: text", '{"edit": 1}', "C:\\x", ":x"]
     assert list(named_modules(texts)) == ["om_a", "om.c"]

@@ -21,14 +21,9 @@ _IDS = _ids(
     *("BigAnt", "ExtendedAnt", "HalfCheetah", "Hopper", "Walker2d", "Swimmer", "Humanoid"),
     "InvertedDoublePendulum",
 )
-_VEHICLES = _ids("Car", "Tank", "Truck", "Boat")
-_MORE_VEHICLES = _ids(
-    *(
-        f"{name}{kind}"
-        for kind in ("Ranges", "Waypoint")
-        for name in ("Car", "Tank", "Truck", "Boat")
-    )
-)
+_NAMES = ("Car", "Tank", "Truck", "Boat")
+_VEHICLES = _ids(*_NAMES)
+_MORE_VEHICLES = _ids(*(name + kind for kind in ("Ranges", "Waypoint") for name in _NAMES))
 _FINGERS = _ids("Finger", "FingerTrack")
 _REMOTE = _ids("RemoteFinger", "RemoteFingerTrack", "RemoteVehicle", "RemoteWaypoint")
 
@@ -65,7 +60,7 @@ def _run(script: str) -> str:
 
 
 def test_import_registers_ids_without_a_simulator() -> None:
-    """Importing registers all ids and loads neither MuJoCo nor PyTorch."""
+    """Neither MuJoCo nor PyTorch is loaded."""
     script = (
         "import sys, gymnasium as gym, shapechanger\n"
         "print(*[name for name in ('mujoco', 'torch', 'glfw', 'OpenGL') if name in sys.modules])\n"
@@ -93,7 +88,6 @@ def test_a_finger_loads_few_modules() -> None:
 
 @pytest.mark.parametrize("blocked", ["mujoco", "glfw", "imageio"])
 def test_missing_dependencies_of_mujoco_envs_name_the_extra(blocked: str) -> None:
-    """If a dependency is missing, making an env raises an error with the command to install it."""
     every = (*_IDS, *_FINGERS, *(_VEHICLES if blocked == "mujoco" else ()))
     lines = _run(_BLOCK.format(blocked=blocked) + _MAKE.format(ids=every)).splitlines()
     assert len(lines) == len(every)
@@ -119,7 +113,6 @@ def test_a_command_names_the_missing_extra(missing: str, extra: str, command: st
 
 
 def test_importing_again_keeps_the_registry() -> None:
-    """Reloading or re-importing the package leaves the registry unchanged."""
     script = (
         "import sys, importlib, gymnasium as gym, shapechanger\n"
         "before = dict(gym.registry)\n"

@@ -85,13 +85,11 @@ def test_the_middle_lies_in_the_range(low: float, high: float, middle: float) ->
     ],
 )
 def test_invalid_features_are_refused(wrong: dict[str, Any], message: str) -> None:
-    """Empty names, empty or NaN ranges and invalid gains and shapes raise LayoutError."""
     with pytest.raises(LayoutError, match=message):
         Feature(**{"name": "x", "unit": "m", **wrong})
 
 
 def test_names_must_be_unique() -> None:
-    """Two features of one name raise LayoutError."""
     with pytest.raises(LayoutError, match="Two features have the name 'eye/image'"):
         Layout((HINGE, EYE, SPEED, EYE))
 
@@ -101,7 +99,7 @@ def test_a_layout_round_trips_through_json() -> None:
     text = LAYOUT.to_json()
     assert Layout.from_json(text) == Layout.from_json(text.encode()) == LAYOUT
     assert "Infinity" not in text
-    for infinity in (float("inf"), 1e308 * 10):  # Equal to the default, and another object.
+    for infinity in (float("inf"), 1e308 * 10):  # Equal to the default, but another object.
         layout = Layout((Feature("a", "m", -infinity, infinity),))
         assert Layout.from_json(layout.to_json()) == layout
     assert Layout.from_json('{"features":[]}').size == 0
@@ -118,7 +116,6 @@ def test_a_layout_round_trips_through_json() -> None:
     ],
 )
 def test_invalid_json_is_refused(text: str | bytes) -> None:
-    """Invalid text raises LayoutError."""
     with pytest.raises(LayoutError, match="This is not a layout: "):
         Layout.from_json(text)
 
@@ -128,7 +125,7 @@ _NAMES = st.text("ab[]*?!0-", min_size=1, max_size=6)
 
 @given(names=st.lists(_NAMES, min_size=1, max_size=5, unique=True), pattern=_NAMES)
 def test_every_name_selects_its_feature(names: list[str], pattern: str) -> None:
-    """Whatever characters a name has, it selects its feature, and so does the name of a hint."""
+    """A name with any characters selects its feature, and so does a name that an error suggests."""
     layout = Layout(tuple(Feature(name, "1") for name in names))
     for name in names:
         assert [feature.name for feature in layout.matching(name)] == [name]

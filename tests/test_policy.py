@@ -1,4 +1,4 @@
-"""Files of named arrays whose bytes somebody else wrote."""
+"""Damaged and malicious policy files are refused."""
 
 from __future__ import annotations
 
@@ -104,8 +104,8 @@ def _forged(content: bytes, change: Callable[[Header], object]) -> bytes:
     return len(text).to_bytes(8, "little") + text + content[8 + length :]
 
 
-def test_what_is_too_large_or_never_ends_is_not_read(path: Path) -> None:
-    """A file that claims 8 GiB, a pipe that nobody writes to, and a device."""
+def test_huge_files_pipes_and_devices_are_not_read(path: Path) -> None:
+    """The file has 8 GiB, the pipe has no writer, and the device never ends."""
     with path.open("wb") as file:
         file.truncate(8 * _GIB)
     assert "more than the limit of 268435456" in _refused(path)

@@ -77,7 +77,7 @@ def test_this_tree_names_one_version() -> None:
 
 
 def test_fragments_of_the_changelog_have_a_kind() -> None:
-    """A fragment with a misspelt kind would never reach the changelog."""
+    """A fragment of another kind would not be published in the changelog."""
     kinds = {one["directory"] for one in _PYPROJECT["tool"]["towncrier"]["type"]}
     names = [file.name for file in (_ROOT / "changelog.d").glob("*.*.md")]
     assert [name for name in names if name.split(".")[-2] not in kinds] == []

@@ -1,4 +1,4 @@
-"""The site: its wiring diagrams, links and API reference, and whether all people can use it."""
+"""The site: its wiring diagrams, links, API reference and accessibility."""
 
 from __future__ import annotations
 
@@ -33,15 +33,13 @@ if TYPE_CHECKING:
 
 ROOT: Final = Path(__file__).parents[1]
 POSITIONS: Final = {pin: position for position, pin in BCM_OF_BOARD.items()}
-
-
 OTHERS: Final = {"rover": EVERYTHING, "skimmer": HOVERCRAFT}
-"""Profiles with drivers that no shipped one has."""
+"""Profiles with drivers that no shipped profile uses."""
 
 
 @pytest.fixture(params=sorted([*shipped_profiles(), *OTHERS]))
 def profile(request: pytest.FixtureRequest) -> Profile:
-    """A shipped profile, or one with other drivers."""
+    """A shipped profile, or a profile with other drivers."""
     if request.param in OTHERS:
         return read_profile(OTHERS[request.param], Path(f"{request.param}.toml"))
     return load_profile(shipped_profiles()[request.param])
@@ -76,8 +74,8 @@ def test_diagrams_show_every_pin_of_a_profile(profile: Profile) -> None:
         assert f"| GPIO{pin} | {POSITIONS[pin]} |" in table
 
 
-def test_pulled_pins_are_those_that_move_something(profile: Profile) -> None:
-    """Each pin of a motor driver has a resistor, as the page on safety demands."""
+def test_pins_that_move_something_have_resistors(profile: Profile) -> None:
+    """Each pin of a motor driver is pulled, so that it is off while the computer starts."""
     all_wires = [wire for device in devices_of(profile) for wire in device.terminals]
     wires = [wire for wire in all_wires if wire.pull not in ("", DIVIDER)]
     pulled = {wire.source: wire.pull for wire in wires}
@@ -146,10 +144,7 @@ def _require(*packages: str) -> None:
 
 @pytest.mark.system
 def test_the_site(tmp_path: Path, chromium: Browser) -> None:
-    """The site builds strictly, has every public name and env, loads nothing, and is accessible.
-
-    One test, so that the site is built once.
-    """
+    """The site builds strictly, has every public name and env, is accessible and self-contained."""
     _require("material", "mkdocstrings", "axe_playwright_python")
     site = tmp_path / "site"
     # With `--quiet`, warnings would not count.

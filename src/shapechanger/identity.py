@@ -97,9 +97,9 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> Identity:
 
 
 def identify_code(names: Iterable[str], *objects: Any) -> Identity:
-    """Return the identity of a part without a model: of modules that define it.
+    """Return the identity of a part without a model, which consists of its modules.
 
-    The modules are those of objects, and of texts such as `my_methods:warm-start`.
+    They define the objects, or are named in texts such as `my_methods:warm-start`.
     """
     return Identity(files=own_modules({*named_modules(names), *modules_of(*objects)}))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -40,7 +41,7 @@ _VARIANTS: dict[str, MakeEnv] = {
         ' {"edit": "lock", "joint": "ankle_3"}]',
     ),
 }
-# Robots of a file, with the built-in task and one of the user's own.
+# A robot from a file, with the built-in task and with a custom one.
 _FILE = str(Path(mujoco_assets.__file__).parent / "assets" / "humanoid.xml")
 _OWN: dict[str, MakeEnv] = {
     "a file": partial(gym.make, OWN_ROBOT, path=_FILE),
@@ -52,7 +53,6 @@ class Roll:
     """Roll over."""
 
     def reward(self, robot: RobotState) -> dict[str, float]:
-        """Return one term."""
         return {"turn": 1.0 - robot.up}
 
 
@@ -86,7 +86,7 @@ _SEEING: dict[str, MakeEnv] = {
     "image and state": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, state=True),
     "random light": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, randomise=True),
 }
-# Vehicles differ by body and world alone; these two show all that is drawn.
+# Vehicles only differ in body and world; these two envs render everything that can be drawn.
 _QUICK = {"shapechanger/BoatWaypoint-v1", "random light"}
 
 
@@ -114,7 +114,6 @@ def test_an_env_with_images_keeps_its_promises(make: MakeEnv) -> None:
 @pytest.mark.filterwarnings("ignore:We recommend you to use a symmetric and normalized:UserWarning")
 @pytest.mark.parametrize("env_id", CATALOGUE)
 def test_stable_baselines3_accepts_the_env(env_id: str) -> None:
-    """Stable-Baselines3's own checker passes."""
     with gym.make(env_id) as env:
         check_env(env)
 
@@ -126,19 +125,14 @@ def test_stable_baselines3_accepts_the_env(env_id: str) -> None:
 )
 def test_vehicles_with_images_can_be_vectorized(mode: str, options: dict[str, str]) -> None:
     """After rendering in the parent, subprocesses must be spawned, not forked."""
-    _play(
-        gym.make_vec(
-            "shapechanger/Car-v1",
-            num_envs=2,
-            vectorization_mode=mode,
-            vector_kwargs=options,
-            size=_SMALL,
-        )
+    envs: Any = gym.make_vec(
+        "shapechanger/Car-v1",
+        num_envs=2,
+        vectorization_mode=mode,
+        vector_kwargs=options,
+        size=_SMALL,
     )
-
-
-def _play(envs: gym.vector.VectorEnv[Any, Any, Any]) -> None:
-    try:
+    with closing(envs):
         observations, infos = envs.reset(seed=0)
         assert observations.shape == (2, *envs.single_observation_space.shape)
         assert infos["course"][0] != infos["course"][1]
@@ -146,5 +140,3 @@ def _play(envs: gym.vector.VectorEnv[Any, Any, Any]) -> None:
         observations, rewards, *_ = envs.step(envs.action_space.sample())
         assert np.isfinite(observations).all()
         assert rewards.shape == (2,)
-    finally:
-        envs.close()

@@ -44,36 +44,29 @@ class Walk(gym.Env[np.ndarray, np.ndarray]):
         self.state = np.zeros(2)
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, Any]:
-        """Start at rest."""
         super().reset(seed=seed)
         self.state[:] = self.start(), 0.0
         return self.seen(), {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Any]:
-        """Push the point for 0.1 s."""
         self.state[1] += 0.1 * self.power * float(action[0])
         self.state[0] += 0.1 * self.state[1]
         info = self.info()
         return self.seen(), self.reward(info), self.ends(), False, info
 
     def start(self) -> float:
-        """Return a random start near the middle."""
         return self.np_random.uniform(-0.1, 0.1)
 
     def seen(self) -> np.ndarray:
-        """Return the observation."""
         return self.state.copy()
 
     def info(self) -> dict[str, Any]:
-        """Return the terms of the reward."""
         return {"reward_forward": self.pay * float(self.state[1]), "reward_alive": self.pay}
 
     def reward(self, info: dict[str, Any]) -> float:
-        """Return their sum."""
         return float(sum(info.values()))
 
     def ends(self) -> bool:
-        """Return whether the point has left the line."""
         return bool(abs(self.state[0]) > self.limit)
 
 
@@ -88,7 +81,6 @@ class Forgetful(Walk):
         self.left = 20 - type(self).made
 
     def ends(self) -> bool:
-        """End when there are no steps left."""
         self.left -= 1
         return self.left < 0
 
@@ -99,18 +91,17 @@ class Wild(Walk):
     steps = 0
 
     def info(self) -> dict[str, Any]:
-        """Diverge."""
         self.steps += 1
         return super().info() if self.steps < 3 else {"diverged": True}
 
 
 def _env(name: str, **attributes: Any) -> type[Walk]:
-    """Return a walk with other attributes or methods, which pickle finds by its name."""
+    """Return a subclass of `Walk` with other attributes or methods, which pickle finds by name."""
     return type(name, (Walk,), {**attributes, "__module__": __name__})
 
 
 def _restored(**changes: Any) -> Any:
-    """Return a method with which copies of an env differ from it."""
+    """Return a `__setstate__` that gives copies of an env other attributes."""
     return lambda self, state: self.__dict__.update(state, **changes)
 
 
@@ -132,7 +123,7 @@ Generous = _env("Generous", reward=lambda self, info: sum(info.values()) + 1e-3)
 Still = _env("Still", start=lambda self: 0.0)
 Outside = _env("Outside", start=lambda self: 1.0 + self.np_random.random())
 Liar = _env("Liar", seen=lambda self: np.append(self.state, 0.0))
-# Single precision, at the ends of its range: 0.1 in single precision is above 0.1.
+# Starts at the ends of the range: 0.1 in single precision is above 0.1.
 Single = _env(
     "Single",
     observation_layout=_low,
@@ -180,7 +171,7 @@ def test_a_broken_promise_is_found(
 
 
 def test_the_exam_ends_at_the_first_broken_promise() -> None:
-    """Each promise is broken by some env; the error is an assertion, too."""
+    """The list above contains each promise; the error is an AssertionError."""
     kept: list[str] = []
     with pytest.raises(BrokenPromise, match="Every start is the same"):
         kept.extend(examine(Still))

@@ -22,8 +22,7 @@ HELD_OUT: Final = 1_000
 class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
     """Stay in the middle of a lane: `steering` moves sideways against wind, `throttle` adds reward.
 
-    Args:
-        grip: Distance that full steering moves in a step.
+    Full steering moves the distance `grip` in a step.
     """
 
     observation_space = gym.spaces.Box(0, 255, (_ROWS, _COLUMNS, 3), np.uint8)
@@ -33,18 +32,9 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
         self.grip = grip
         self.place = 0.0
         self.held_out = False
-        self.observation_layout = Layout(
-            (
-                Feature(
-                    "camera/image",
-                    "1",
-                    0.0,
-                    255.0,
-                    Element("camera", "camera"),
-                    (_ROWS, _COLUMNS, 3),
-                ),
-            )
-        )
+        camera = Element("camera", "camera")
+        image = Feature("camera/image", "1", 0.0, 255.0, camera, (_ROWS, _COLUMNS, 3))
+        self.observation_layout = Layout((image,))
         self.action_layout = Layout(
             tuple(
                 Feature(f"{name}/value", "1", -1.0, 1.0, Element("actuator", name))
@@ -87,7 +77,7 @@ class _Keeper:
         self._rng = np.random.default_rng(seed)
 
     def begin(self) -> None:
-        """Do nothing at the start of an episode."""
+        pass
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         meant = np.array([-self._lane.place, 0.5], np.float32)
@@ -98,7 +88,7 @@ class _Keeper:
 
 
 gym.register("tests/Lane-v0", Lane, max_episode_steps=30)
-# Three ids, as the vehicles of a suite have.
+# The envs of a suite have different ids.
 for _name, _grip in (("Dry", 0.3), ("Wet", 0.2), ("Icy", 0.1)):
     gym.register(f"tests/{_name}-v1", Lane, max_episode_steps=30, kwargs={"grip": _grip})
 

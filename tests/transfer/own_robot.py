@@ -49,12 +49,7 @@ TINY = PpoSettings(
 
 
 def write_project(folder: Path, name: str) -> None:
-    """Write two robots, a task with a module that it imports, and a method.
-
-    Args:
-        folder: The folder.
-        name: Beginning of the names of the modules, so that no two tests share one.
-    """
+    """Write two robots, and modules of a task, its goal and a method, with this prefix."""
     (folder / "a.xml").write_text(XML.format(1.5))
     (folder / "b.xml").write_text(XML.format(2.5))
     (folder / f"{name}_task.py").write_text(TASK.format(name=name))

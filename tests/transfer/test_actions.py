@@ -1,4 +1,4 @@
-"""Learners act from -1 to 1, and all that surrounds them in the units of the actuators."""
+"""Learners act from -1 to 1; envs, policies and exports use the units of the actuators."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _trained(folder: Path, name: str, unit: str, actuator: str) -> tuple[Any, li
 def test_the_unit_of_an_actuator_does_not_change_learning(
     tmp_path: Path, name: str, units: tuple[str, ...]
 ) -> None:
-    """The same robot in other units learns the same, to the last bit."""
+    """A robot with other units of its actuator gives equal weights, to the last bit."""
     policy, curve = _trained(tmp_path, name, "share", _UNITS["share"])
     assert len({evaluation.mean_return for evaluation in curve}) > 1
     for unit in units:
@@ -92,7 +92,7 @@ def test_the_unit_of_an_actuator_does_not_change_learning(
 
 @pytest.mark.parametrize("name", ["ppo-balance", "sac"])
 def test_a_policy_acts_in_the_units_of_the_env(tmp_path: Path, name: str) -> None:
-    """Loaded from a file and exported as ONNX too."""
+    """The same holds for the loaded policy and for its ONNX export."""
     policy, _ = _trained(tmp_path, name, "bytes", _BYTES)
     seen = np.random.default_rng(0).normal(size=(20, 2))
     expected = policy.act(seen)
@@ -107,7 +107,7 @@ def test_a_policy_acts_in_the_units_of_the_env(tmp_path: Path, name: str) -> Non
 
 
 def test_a_transplant_keeps_the_units_of_the_map(tmp_path: Path) -> None:
-    """Means and deviations of PPO are moved in the units of the layouts, not in the models'."""
+    """PPO's means and deviations are converted in the units of the layouts."""
     policy, _ = _trained(tmp_path, "ppo-balance", "bytes", _BYTES)
     source = policy.card.action
     target = Layout((msgspec.structs.replace(source.features[0], low=-32.0, high=32.0),))
@@ -182,7 +182,7 @@ def _pair(env_id: str, threads: int, **more: Any) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("env_id", [_PENDULUM, "shapechanger/Ant-v1", "shapechanger/Hopper-v1"])
-def test_results_equal_those_of_sb3(env_id: str, threads: int) -> None:
+def test_results_equal_stable_baselines3(env_id: str, threads: int) -> None:
     """Observations, rewards, ends and infos are equal, also in VecMonitor."""
     ours, theirs = (VecMonitor(one) for one in _pair(env_id, threads, max_episode_steps=60))
     for one in (ours, theirs):
@@ -206,7 +206,7 @@ def test_results_equal_those_of_sb3(env_id: str, threads: int) -> None:
     ours.close()
 
 
-def test_options_are_each_envs_own() -> None:
+def test_each_env_gets_its_own_options() -> None:
     ours, theirs = _pair("shapechanger/Ant-v1", 2)
     for one in (ours, theirs):
         one.seed(1)

@@ -97,7 +97,7 @@ def test_a_clone_improves_with_each_budget(tmp_path: Path) -> None:
 def test_rehearsal_starts_from_the_source_and_learns_from_both(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:
-    """Rehearsal adds only the source's demonstrations, which exist already, to fine-tuning."""
+    """Rehearsal is fine-tuning with the recorded demonstrations of the source in addition."""
     folder = tmp_path / "study"
     shutil.copytree(finished[1], folder)
     (folder / STUDY_FILE).unlink()
@@ -209,13 +209,8 @@ def test_the_clones_of_the_package_are_sources(vehicle: str) -> None:
 def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a clone of the demonstrator on the dry lane."""
     folder = tmp_path_factory.mktemp("clone")
-    policy = CloneLearner("cloning", QUICK_CLONING).train(
-        DRY,
-        40,
-        3,
-        demonstrations=SharedFile(folder / "shown.npz", 3),
-        on_evaluation=lambda evaluation: None,
-    )
+    shown = SharedFile(folder / "shown.npz", 3)
+    policy = CloneLearner("cloning", QUICK_CLONING).train(DRY, 40, 3, demonstrations=shown)
     policy.save(folder / "dry.safetensors")
     return folder / "dry.safetensors"
 
@@ -224,15 +219,13 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a policy of a pendulum trained with PPO."""
     path = tmp_path_factory.mktemp("ppo") / "pole.safetensors"
-    policy = Sb3Learner("tiny", TINY).train(SMALL, 32, 3, on_evaluation=lambda evaluation: None)
-    save_policy(policy, path)
+    save_policy(Sb3Learner("tiny", TINY).train(SMALL, 32, 3), path)
     return path
 
 
-def _given(source_policy: Path, **more: Any) -> Plan:
-    task = more.pop("task", TransferTask(DRY, ICY))
-    settings = more.pop("settings", QUICK_CLONING)
-    return make_plan(task, "cloning", settings, seeds=2, source_policy=source_policy, **more)
+def _given(source_policy: Path, source: EnvRef = DRY) -> Plan:
+    task = TransferTask(source, ICY)
+    return make_plan(task, "cloning", QUICK_CLONING, seeds=2, source_policy=source_policy)
 
 
 def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> None:
@@ -266,32 +259,24 @@ def test_a_study_resumes_with_its_planned_clone_only(clone_file: Path, tmp_path:
     ],
 )
 def test_a_clone_of_another_source_is_refused(clone_file: Path, source: EnvRef, text: str) -> None:
-    """The message names the env that it was trained in."""
     with pytest.raises(SpaceMismatch, match=text):
-        _given(clone_file, task=TransferTask(source, ICY))
+        _given(clone_file, source)
 
 
-def test_ppo_refuses_a_clone(clone_file: Path) -> None:
+def test_unsuitable_clones_are_refused(clone_file: Path, tmp_path: Path) -> None:
+    """PPO cannot train a clone, and a clone of recordings has no source env."""
     with pytest.raises(PolicyError, match=r"dry\.safetensors is a clone .* tiny cannot train"):
         tiny_plan(source_policy=clone_file)
-
-
-def test_a_clone_of_recordings_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "found.safetensors"
     CameraPolicy.fresh(QUICK_CLONING.clone, 0).save(path)
     with pytest.raises(PolicyError, match="learned from recordings without an env"):
         _given(path)
 
 
-def test_a_missing_policy_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(PolicyError, match=r"There is no policy file .*none\.safetensors"):
-        _given(tmp_path / "none.safetensors")
-
-
-def test_source_steps_are_those_of_arms_that_train_their_own(
+def test_source_steps_apply_to_arms_that_train_their_own_source(
     ppo_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If a source policy is given, source steps only have an effect on arms that train another."""
+    """The other arms start from the given source policy."""
     counted: list[int] = []
 
     def summarised(*arguments: Any, source_steps: int, **more: Any) -> Summary:

@@ -30,8 +30,7 @@ from shapechanger.transfer.references import FOLDER, load_references, reference_
 
 
 @given(st.sets(st.integers(0, 99_999), min_size=2, max_size=2), st.integers(1, 10_000))
-def test_each_finger_of_a_gap_is_judged_on_targets_of_its_own(pair: set[int], many: int) -> None:
-    """Two fingers share no seed of an episode."""
+def test_fingers_are_evaluated_with_different_seeds(pair: set[int], many: int) -> None:
     first, second = (
         evaluation_seed(EnvRef("shapechanger/Finger-v1", {"gap": "wide", "finger_seed": i}), many)
         for i in sorted(pair)
@@ -50,7 +49,7 @@ def test_every_seed_of_a_finger_gives_seeds_that_exist(seed: int, kwargs: dict[s
 
 
 class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):
-    """An episode of as many steps as its seed; each is worth its action plus one."""
+    """Env whose episodes last `seed` steps; the reward of a step is its action plus 1."""
 
     observation_space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -67,7 +66,7 @@ class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):
 
 
 def test_returns_lengths_and_terms_are_means_over_episodes() -> None:
-    """Episodes of 3, 4 and 5 steps, each step worth 1.5."""
+    """Episodes have 3, 4 and 5 steps with a reward of 1.5 each."""
     envs = [Countdown() for _ in range(3)]
     result = evaluate(lambda observations: np.full((len(observations), 1), 0.5), envs, 3, 7)
     assert result.steps == 7
@@ -95,7 +94,7 @@ def test_one_env_plays_several_episodes() -> None:
 
 
 class Succeeding(Countdown):
-    """An env that reports a given success at each step, or none."""
+    """Env that reports the successes in a list, one at each step."""
 
     def __init__(self, successes: list[bool]) -> None:
         self.successes = successes
@@ -106,7 +105,7 @@ class Succeeding(Countdown):
 
 
 def test_the_last_success_counts() -> None:
-    """Success is the mean of the last values of the episodes; None without any."""
+    """Success is the mean over episodes of their last value; None if no episode reports it."""
     assert evaluate(lambda o: np.zeros((len(o), 1)), [Countdown()], 1).success is None
     envs = [Succeeding(successes) for successes in ([False, True], [True, False], [True], [])]
     result = evaluate(lambda o: np.zeros((len(o), 1)), envs, 1)
@@ -114,7 +113,7 @@ def test_the_last_success_counts() -> None:
 
 
 class Runner(Countdown):
-    """An env at 2 m/s until it falls, with a reward term of a NumPy type."""
+    """Env that runs at 2 m/s until it falls, with a reward term of a NumPy type."""
 
     measures = (FORWARD_SPEED,)
     spec = EnvSpec("Runner-v0", max_episode_steps=8)
@@ -151,16 +150,14 @@ def test_the_standing_share_of_a_vehicle_is_reported() -> None:
 REFERENCES = load_references()
 
 
-def test_every_env_of_the_catalogue_has_one() -> None:
+def test_every_env_of_the_catalogue_has_a_reference() -> None:
     assert set(REFERENCES) == set(CATALOGUE)
-    assert {path for path in FOLDER.glob("*.safetensors")} == {
-        reference_policy(env) for env in REFERENCES
-    }
+    assert set(FOLDER.glob("*.safetensors")) == {reference_policy(env) for env in REFERENCES}
 
 
 @pytest.mark.parametrize("env_id", REFERENCES)
-def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
-    """The card is the reference's, and an episode is far above the floor."""
+def test_a_reference_policy_performs_as_stated(env_id: str) -> None:
+    """Its card has the numbers of the reference, and an episode scores far above the floor."""
     env, reference = EnvRef(env_id), REFERENCES[env_id]
     policy = load_policy(reference_policy(env_id))
     assert policy.card.env == env
@@ -170,12 +167,9 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
     # Reference policies of pendulums were trained when learners' actions were forces in N.
     in_newtons = "Pendulum" in env_id and "Double" not in env_id
     assert default_learner(env) == ("ppo-pendulum" if in_newtons else reference.learner)
-    made = env.make()
-    try:
+    with closing(env.make()) as made:
         measures = [measure.name for measure in measures_of(made)]
         found = evaluate(policy.act, [made], EVALUATION_SEED, episodes=1)
-    finally:
-        made.close()
     assert list(reference.ends) == measures
     measure = measures[0]
     floor = max(values[measure] for values in reference.floor.values())
@@ -183,7 +177,7 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
     assert found.value(measure) > floor + 0.25 * (end - floor)
 
 
-def test_other_bodies_have_none() -> None:
+def test_other_bodies_have_no_reference() -> None:
     assert reference_of(EnvRef("shapechanger/Ant-v1")) is not None
     assert reference_of(EnvRef("shapechanger/Ant-v1", {"body": "BigAnt"})) is None
     assert reference_of(EnvRef("Ant-v5")) is None

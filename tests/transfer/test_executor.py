@@ -23,10 +23,10 @@ from tests.transfer.studies import tiny_plan
 
 pytestmark = [pytest.mark.system, pytest.mark.filterwarnings("ignore::FutureWarning:ray")]
 
-EXECUTORS = [Serial(), Processes(2)]
+_ROOT = str(Path(__file__).parents[2])
 
 
-@pytest.mark.parametrize("executor", EXECUTORS, ids=["serial", "processes"])
+@pytest.mark.parametrize("executor", [Serial(), Processes(2)], ids=["serial", "processes"])
 def test_jobs_wait_for_those_before_them(executor: Executor, tmp_path: Path) -> None:
     """A job starts after those that it depends on, whatever the order of the list."""
     names = ("last", "middle", "first")
@@ -42,7 +42,7 @@ def test_jobs_wait_for_those_before_them(executor: Executor, tmp_path: Path) -> 
     assert seen == ["first", "middle", "last"]
 
 
-def test_in_this_process_an_error_comes_back_as_it_was() -> None:
+def test_serial_raises_the_error_of_a_job() -> None:
     with pytest.raises(UnknownName, match="No thing matches 'this'"):
         Serial().run([Job("refuse", jobs.refuse, ())], lambda *_: None)
 
@@ -50,7 +50,7 @@ def test_in_this_process_an_error_comes_back_as_it_was() -> None:
 def test_failed_jobs_are_reported_and_others_continue(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Users' errors, bugs with their tracebacks, lost processes, and the jobs that need them."""
+    """The message lists users' errors, bugs with tracebacks, lost processes and skipped jobs."""
     mark, attempts = tmp_path / "mark", tmp_path / "attempts"
     seen: list[str] = []
     with pytest.raises(FailedRuns) as caught:
@@ -79,7 +79,6 @@ def test_failed_jobs_are_reported_and_others_continue(
 
 
 def test_a_lost_process_is_replaced(tmp_path: Path) -> None:
-    """A job whose process was killed once ends in another."""
     mark = tmp_path / "mark"
     Processes(1).run([Job("vanish", jobs.vanish_once, (str(mark),))], lambda *_: None)
     assert mark.read_text() == "attempt\nattempt\n"
@@ -95,7 +94,7 @@ def test_a_job_of_one_attempt_is_not_repeated(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_ends_all_jobs(tmp_path: Path) -> None:
-    """No other job could write its result either."""
+    """Other jobs do not start, because they could not write their results either."""
     mark = tmp_path / "mark"
     with pytest.raises(OutputError, match="No space left"):
         Processes(1).run(
@@ -120,10 +119,9 @@ def test_a_script_without_a_guarded_start_is_reported(tmp_path: Path) -> None:
 def test_processes_end_with_their_parent(tmp_path: Path) -> None:
     pid_file = tmp_path / "pid"
     code = f"from tests.transfer import jobs; jobs.run_for_ever({str(pid_file)!r})"
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    main = f"if __name__ == '__main__':\n    {code}\n"
+    environment = {**os.environ, "PYTHONPATH": _ROOT}
     script = tmp_path / "parent.py"
-    script.write_text(main)
+    script.write_text(f"if __name__ == '__main__':\n    {code}\n")
     parent = subprocess.Popen([sys.executable, str(script)], env=environment)
     try:
         eventually(lambda: pid_file.exists() and bool(pid_file.read_text()), 60.0)
@@ -144,7 +142,7 @@ def _alive(pid: int) -> bool:
 
 
 _MEMORY = 80_000_000
-# After this many reports of the other job, two a second, the worker of a killed node has ended.
+# Reports of the other job, two a second, until the worker of a killed node has ended.
 _UNTIL_DEAD = 6
 
 
@@ -153,46 +151,28 @@ def cluster() -> Iterator[Any]:
     """A head node without cores, so that all jobs run on nodes that can be killed."""
     from ray.cluster_utils import Cluster
 
-    # Workers import the jobs of the tests.
-    root = str(Path(__file__).parents[2])
-    before = os.environ.get("PYTHONPATH")
-    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (root, before)))
-    nodes: Any = Cluster(
-        initialize_head=True,
-        head_node_args={
-            "num_cpus": 0,
-            "object_store_memory": _MEMORY,
-            # Notice a lost node within two seconds; by default it takes half a minute.
-            "_system_config": {
-                "health_check_initial_delay_ms": 500,
-                "health_check_period_ms": 500,
-                "health_check_timeout_ms": 500,
-                "health_check_failure_threshold": 3,
-            },
-        },
-    )
-    nodes.add_node(num_cpus=1, object_store_memory=_MEMORY)
-    yield nodes
-    nodes.shutdown()
-    if before is None:
-        del os.environ["PYTHONPATH"]
-    else:
-        os.environ["PYTHONPATH"] = before
+    # A lost node is noticed within two seconds; by default it takes half a minute.
+    health = dict.fromkeys((f"health_check_{n}_ms" for n in ("period", "timeout")), 500)
+    health |= {"health_check_initial_delay_ms": 500, "health_check_failure_threshold": 3}
+    head = {"num_cpus": 0, "object_store_memory": _MEMORY, "_system_config": health}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", _ROOT, prepend=os.pathsep)  # Workers import the tests' jobs.
+        nodes: Any = Cluster(initialize_head=True, head_node_args=head)
+        nodes.add_node(num_cpus=1, object_store_memory=_MEMORY)
+        yield nodes
+        nodes.shutdown()
 
 
 @pytest.mark.slow
-def test_a_study_has_the_numbers_of_this_machine(cluster: Any, tmp_path: Path) -> None:
-    """Equal seeds give equal numbers, and progress arrives."""
+def test_a_study_on_a_cluster_gives_equal_numbers(cluster: Any, tmp_path: Path) -> None:
+    """The numbers equal a study in one process, and progress is reported."""
     seen: set[str] = set()
-
-    def on_progress(name: str, steps: int, ended: bool) -> None:
-        del steps
-        if ended:
-            seen.add(name)
-
     plan = tiny_plan()
     there = run_study(
-        plan, tmp_path / "there", executor=RayCluster(cluster.address), on_progress=on_progress
+        plan,
+        tmp_path / "there",
+        executor=RayCluster(cluster.address),
+        on_progress=lambda name, _, ended: seen.add(name) if ended else None,
     )
     here = run_study(plan, tmp_path / "here", executor=Serial())
     assert [run.curve for run in there.runs] == [run.curve for run in here.runs]
@@ -229,7 +209,7 @@ def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path)
     assert attempts() == 3
 
 
-@pytest.mark.timeout(60)  # Ray alone tries for longer.
+@pytest.mark.timeout(60)  # Ray itself would retry for longer.
 @pytest.mark.parametrize(
     ("address", "text"),
     [
@@ -239,6 +219,6 @@ def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path)
         ("ray://127.0.0.1:9", "HOST:PORT"),
     ],
 )
-def test_an_address_that_does_not_answer_is_one_sentence(address: str, text: str) -> None:
+def test_a_wrong_address_is_refused(address: str, text: str) -> None:
     with pytest.raises(StudyError, match=re.escape(text)):
         RayCluster(address).run([], lambda *_: None)

@@ -68,8 +68,7 @@ def narrow_sac(envs: VecEnv, seed: int, *, width: int = 8) -> BaseAlgorithm:
 
 
 def not_a_model(envs: VecEnv, seed: int) -> object:
-    """A function that returns something else."""
-    del envs, seed
+    """A function that returns no model."""
     return "a policy"
 
 
@@ -82,17 +81,10 @@ class Unstable(A2C):
 
 
 def settings_of(learner: str) -> Sb3Settings:
-    if learner in ("sac", "tqc"):
-        _, settings = resolve_learner(learner, SHORT)
-    else:
-        short = {name: SHORT[name] for name in ("steps", "eval_every", "eval_episodes")}
-        _, settings = resolve_learner(learner, short)
+    short = {name: SHORT[name] for name in ("steps", "eval_every", "eval_episodes")}
+    _, settings = resolve_learner(learner, SHORT if learner in ("sac", "tqc") else short)
     assert isinstance(settings, Sb3Settings)
     return settings
-
-
-def _ignore(evaluation: Evaluation) -> None:
-    del evaluation
 
 
 EACH = ("sac", "tqc", "stable_baselines3:A2C", f"{HERE}:narrow_sac")
@@ -101,22 +93,15 @@ EACH = ("sac", "tqc", "stable_baselines3:A2C", f"{HERE}:narrow_sac")
 def trained(learner: str, **options: Any) -> tuple[TrainedPolicy, list[Evaluation], Sb3Settings]:
     settings = settings_of(learner)
     curve: list[Evaluation] = []
-    policy = Sb3Learner(learner, settings).train(
-        SMALL, 64, 0, on_evaluation=curve.append, **options
-    )
-    return policy, curve, settings
+    train = Sb3Learner(learner, settings).train
+    return train(SMALL, 64, 0, on_evaluation=curve.append, **options), curve, settings
 
 
 @pytest.mark.parametrize("learner", EACH)
 def test_policies_round_trip(learner: str, tmp_path: Path) -> None:
     """Every learner is evaluated at the same steps, and its policy round trips."""
     policy, curve, settings = trained(learner)
-    update = settings.update_steps
-    assert [one.steps for one in curve] == [
-        0,
-        -(-32 // update) * update,
-        settings.whole_updates(64),
-    ]
+    assert [one.steps for one in curve] == [0, *map(settings.whole_updates, (32, 64))]
     path = tmp_path / "policy.safetensors"
     save_policy(policy, path)
     again = Sb3Learner(learner, settings).load(path)
@@ -152,7 +137,7 @@ def test_a_file_alone_imports_no_module(tmp_path: Path, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("learner", EACH[:3])
 def test_a_transplanted_policy_acts_as_the_source(learner: str) -> None:
-    """Before its first update it acts as the source, instead of at random."""
+    """Before its first update, it acts as the source does, through the body map."""
     policy, curve, settings = trained(learner)
     plan = tiny_plan(settings)
     moved: list[Evaluation] = []
@@ -169,9 +154,7 @@ def test_a_transplanted_policy_is_kept_until_updates_start() -> None:
     assert isinstance(settings, OffPolicySettings)
     plan = tiny_plan(settings)
     late = msgspec.structs.replace(settings, learning_starts=64)
-    moved = Sb3Learner("sac", late).train(
-        SMALL, 64, 1, on_evaluation=_ignore, start=policy, body_map=plan.body_map
-    )
+    moved = Sb3Learner("sac", late).train(SMALL, 64, 1, start=policy, body_map=plan.body_map)
     observations = np.random.default_rng(0).normal(size=(20, 4))
     np.testing.assert_allclose(moved.act(observations), policy.act(observations), rtol=1e-5)
 
@@ -209,14 +192,12 @@ def test_a_wrong_file_of_settings_is_refused(tmp_path: Path, text: str, message:
         resolve_learner(str(path), {})
 
 
-def test_a_function_that_builds_something_else_is_refused() -> None:
-    with pytest.raises(StudyError, match="returned str"):
-        trained(f"{HERE}:not_a_model")
-
-
-def test_a_training_that_diverges_is_refused() -> None:
-    with pytest.raises(StudyError, match="diverged after"):
-        trained(f"{HERE}:Unstable")
+@pytest.mark.parametrize(
+    ("name", "message"), [("not_a_model", "returned str"), ("Unstable", "diverged after")]
+)
+def test_an_unsuitable_algorithm_is_refused(name: str, message: str) -> None:
+    with pytest.raises(StudyError, match=message):
+        trained(f"{HERE}:{name}")
 
 
 def test_some_settings_change_and_others_stay() -> None:
@@ -228,7 +209,7 @@ def test_some_settings_change_and_others_stay() -> None:
     assert resolve_learner("ppo-run", {}) == ("ppo-run", learner_settings("ppo-run"))
 
 
-def test_every_learner_says_what_it_was_tuned_on() -> None:
+def test_every_learner_states_what_it_was_tuned_on() -> None:
     """The envs exist, and the text states whether an env is one of them."""
     for learner in LEARNERS:
         for name in tuned_on(learner):
@@ -244,7 +225,7 @@ _LONG = msgspec.structs.replace(TINY, n_steps=256, eval_every=512, steps=512)
 
 
 class _Actions(BaseCallback):
-    """Collects the actions of the first rollout, and what the mean would have been."""
+    """Collects the deviations of actions from their means in a rollout."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -263,7 +244,7 @@ class _Actions(BaseCallback):
 
 def _source(log_std: float) -> TrainedPolicy:
     """A policy whose actions have this standard deviation."""
-    policy = Sb3Learner("tiny", TINY).train(SMALL, 32, 0, on_evaluation=lambda _: None)
+    policy = Sb3Learner("tiny", TINY).train(SMALL, 32, 0)
     model: Any = policy.model
     model.policy.log_std.data.fill_(log_std)
     return policy
@@ -271,12 +252,9 @@ def _source(log_std: float) -> TrainedPolicy:
 
 def _tuned(source: TrainedPolicy, settings: Sb3Settings = _LONG) -> tuple[TrainedPolicy, Any]:
     actions = _Actions()
-    body_map = BodyMap.between(
-        source.card.observation, source.card.observation, source.card.action, source.card.action
-    )
-    policy = Sb3Learner("tiny", settings).train(
-        BIG, 512, 0, start=source, body_map=body_map, callback=actions, on_evaluation=lambda _: None
-    )
+    same = BodyMap.identity(*source.card.layouts)
+    train = Sb3Learner("tiny", settings).train
+    policy = train(BIG, 512, 0, start=source, body_map=same, callback=actions)
     return policy, actions.noise
 
 
@@ -284,8 +262,10 @@ def _tuned(source: TrainedPolicy, settings: Sb3Settings = _LONG) -> tuple[Traine
     ("source", "start"), [(-4.0, START_LOG_STD), (-1.3, START_LOG_STD), (-0.3, -0.3)]
 )
 def test_fine_tuning_explores(source: float, start: float, tmp_path: Path) -> None:
-    """A collapsed deviation is raised to the stated one, a larger one kept; the card says so."""
-    policy, noise = _tuned(_source(source))
+    """A deviation below `START_LOG_STD` is raised to it; the card contains the first deviation."""
+    before = _source(source)
+    assert before.card.start_log_std is None
+    policy, noise = _tuned(before)
     assert policy.card.start_log_std == (pytest.approx(start),)
     assert noise.std() == pytest.approx(np.exp(start), rel=0.15)
     save_policy(policy, tmp_path / "policy.safetensors")
@@ -298,13 +278,7 @@ def test_a_start_policy_explores_no_more_than_a_new_policy() -> None:
     assert policy.card.start_log_std == (pytest.approx(-2.0),)
 
 
-def test_a_new_policy_has_no_such_start() -> None:
-    assert _source(-4.0).card.start_log_std is None
-
-
 FINGER = EnvRef("shapechanger/Finger-v1")
-
-
 _STEPS = 100  # Steps of an episode.
 
 

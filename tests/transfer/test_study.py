@@ -33,6 +33,7 @@ from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Serial
 from shapechanger.transfer.plan import ARMS, TransferTask
 from shapechanger.transfer.study import STUDY_FILE, Study, default_arms, inspect_task, run_study
+from tests.demos.exchange.small import snapshot
 from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, curves, tiny_plan
 
 
@@ -41,6 +42,12 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
     """A study that was not interrupted, and its folder."""
     out = tmp_path_factory.mktemp("finished") / "study"
     return run_study(tiny_plan(), out, executor=Serial(), command="test"), out
+
+
+@pytest.fixture
+def out(finished: tuple[Study, Path], tmp_path: Path) -> Path:
+    """A copy of the folder of the finished study."""
+    return Path(shutil.copytree(finished[1], tmp_path / "study"))
 
 
 def test_every_arm_and_seed_is_evaluated(finished: tuple[Study, Path]) -> None:
@@ -63,21 +70,19 @@ def test_zero_shot_is_where_fine_tuning_starts(finished: tuple[Study, Path]) -> 
         assert unchanged.curve[0].mean_length == tuned.curve[0].mean_length
 
 
-def test_incomplete_runs_are_repeated(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    study, out = finished
-    cut = tmp_path / "cut"
-    shutil.copytree(out, cut)
-    (cut / STUDY_FILE).unlink()
+def test_incomplete_runs_are_repeated(finished: tuple[Study, Path], out: Path) -> None:
+    (out / STUDY_FILE).unlink()
+    runs = out / "runs"
     for name in ("scratch-1", "source-1", "fine-tune-1"):
-        (cut / "runs" / name / "run.json").unlink()
-    (cut / "runs" / "scratch-1" / "curve.jsonl").write_text("half a li")
-    (cut / "runs" / "source-0" / "policy.safetensors").unlink()
-    kept = (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
-    resumed = run_study(tiny_plan(), cut, executor=Serial())
-    assert curves(resumed) == curves(study)
-    assert resumed.summaries == study.summaries
-    assert (cut / "runs" / "source-0" / "policy.safetensors").exists()
-    assert (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == kept
+        (runs / name / "run.json").unlink()
+    (runs / "scratch-1" / "curve.jsonl").write_text("half a li")
+    (runs / "source-0" / "policy.safetensors").unlink()
+    kept = (runs / "scratch-0" / "run.json").stat().st_mtime_ns
+    resumed = run_study(tiny_plan(), out, executor=Serial())
+    assert curves(resumed) == curves(finished[0])
+    assert resumed.summaries == finished[0].summaries
+    assert (runs / "source-0" / "policy.safetensors").exists()
+    assert (runs / "scratch-0" / "run.json").stat().st_mtime_ns == kept
 
 
 def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
@@ -122,10 +127,10 @@ _NOT_PLANNED: list[tuple[dict[str, Any], type[Exception], str]] = [
         for name, which in (("steps", "target"), ("source_steps", "source"))
         for steps in (1, 31)
     ),
-    # Half of the target's steps, which the user has not typed.
+    # By default, half of the target steps, rounded up to whole updates.
     ({"settings": _SPARSE, "steps": 96}, StudyError, "64 source steps "),
     ({"seeds": 1}, StudyError, "at least 2 seeds"),
-    # What a generator would refuse after hours.
+    # Generators would refuse these seeds, but only after hours of training.
     *(
         ({"seed": seed}, StudyError, "A seed must be a whole number from 0 to 4294967295, got ")
         for seed in (-1, 2**32, 2**64, 0.5, True, "3")
@@ -147,11 +152,9 @@ def test_wrong_arguments_are_refused_before_anything_is_trained(
 
 @pytest.mark.parametrize("differs", ["seed", "versions"])
 def test_a_folder_of_another_study_is_refused(
-    finished: tuple[Study, Path], tmp_path: Path, differs: str
+    finished: tuple[Study, Path], out: Path, differs: str
 ) -> None:
     """The message names the differences; nothing is overwritten."""
-    out = tmp_path / "study"
-    shutil.copytree(finished[1], out)
     changed: Any = {"seed": 1, "versions": {"mujoco": "0.1"}}[differs]
     other = msgspec.structs.replace(tiny_plan(), **{differs: changed})
     with pytest.raises(ForeignStudy, match=f"differs in {differs}"):
@@ -167,7 +170,7 @@ def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
 
 
 class _Planned(Executor):
-    """An executor that keeps its jobs and runs none."""
+    """An executor that only records its jobs."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         self.jobs = jobs
@@ -185,11 +188,7 @@ def test_runs_of_a_robot_wait_for_one_another(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("how", ["another run's", "cut short", "empty"])
-def test_a_result_that_is_not_the_runs_own_is_refused(
-    finished: tuple[Study, Path], tmp_path: Path, how: str
-) -> None:
-    out = tmp_path / "study"
-    shutil.copytree(finished[1], out)
+def test_a_wrong_result_of_a_run_is_refused(out: Path, how: str) -> None:
     path = out / "runs" / "scratch-0" / "run.json"
     if how == "another run's":
         shutil.copy(out / "runs" / "scratch-1" / "run.json", path)
@@ -202,16 +201,12 @@ def test_a_result_that_is_not_the_runs_own_is_refused(
 
 
 @pytest.mark.parametrize("name", ["plan.json", "runs/scratch-0/run.json"])
-def test_a_corrupt_file_is_named_and_nothing_is_lost(
-    finished: tuple[Study, Path], tmp_path: Path, name: str
-) -> None:
-    out = tmp_path / "study"
-    shutil.copytree(finished[1], out)
+def test_a_corrupt_file_is_named_and_nothing_is_lost(out: Path, name: str) -> None:
     (out / name).write_text('{"not": "it"')
-    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    before = snapshot(out)
     with pytest.raises(CorruptStudy, match=name.replace(".", r"\.")):
         run_study(tiny_plan(), out, executor=Serial())
-    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+    assert snapshot(out) == before
 
 
 def test_a_full_disk_loses_nothing(

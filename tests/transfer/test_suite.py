@@ -33,11 +33,7 @@ class _Stopped(Exception):
 
 
 class _Recording(Serial):
-    """Executor that records its jobs.
-
-    Args:
-        refuses: Whether to run none of them.
-    """
+    """Executor that records its jobs; if it `refuses`, it runs none of them."""
 
     def __init__(self, *, refuses: bool = False) -> None:
         self.names: list[str] = []
@@ -112,7 +108,7 @@ def test_runs_of_a_source_are_shared(out: Path) -> None:
 
 
 def test_runs_of_a_target_are_shared(out: Path) -> None:
-    """Studies of one target share its runs, with the numbers of a study alone."""
+    """Studies of one target share its runs; the numbers equal a separate study's."""
     plan, executor = _plan(ICY, WET), _Recording()
     parallel = _run(plan, out, executor=executor)
     assert set(executor.names) == _names("source", "zero-shot", "fine-tune")
@@ -169,7 +165,8 @@ def test_partial_copies_are_removed(out: Path, monkeypatch: pytest.MonkeyPatch) 
     assert snapshot(runs / "source-0") == snapshot(out / "Dry-to-Wet" / "runs" / "source-0")
 
 
-_STEADY = np.linspace(0.0, 1000.0, 11)  # To 1,000 in 10,240 steps, an evaluation each 1,024.
+# Rises to 1,000 in 10,240 steps, with an evaluation every 1,024 steps.
+_STEADY = np.linspace(0.0, 1000.0, 11)
 
 
 def _twice(means: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -219,7 +216,7 @@ def test_less_than_half_of_the_steps_of_scratch_is_needed(
 
 
 def test_fine_tune_may_be_left_out() -> None:
-    """The first other arm that learns is compared with scratch; without one, zero-shot."""
+    """Then the first other arm that learns there is compared with scratch, or else zero-shot."""
     found = study_outcome("Ant-to-BigAnt", make_study(arms=("scratch", "zero-shot")))
     assert found.arm == "zero-shot"
     assert found.arm_final == found.zero_shot == pytest.approx(400.0)

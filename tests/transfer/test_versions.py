@@ -1,4 +1,4 @@
-"""Versions are never mixed, and parts of other packages are found."""
+"""Runs of different versions are never mixed, and parts of other packages are found."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def copied(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of that folder, which is the current one."""
+    """A copy of the folder with the finished study, as the current directory."""
     folder = tmp_path / "copy"
     shutil.copytree(done, folder)
     monkeypatch.chdir(folder)
@@ -91,7 +91,7 @@ _EDITS = {
 
 @pytest.mark.parametrize(("edit", "seeds"), [*((edit, 2) for edit in _EDITS), ("the task", 3)])
 def test_an_edited_file_does_not_join_older_runs(edit: str, seeds: int, copied: Path) -> None:
-    """Resuming and growing are refused, name the change and the way out, and change nothing."""
+    """Resuming and adding seeds are refused; the message names the change, and no file changes."""
     file, content, text = _EDITS[edit]
     (copied / file).write_text(content)
     before = snapshot(copied / "study")
@@ -130,8 +130,8 @@ def test_growing_an_unchanged_study_gives_the_same_numbers(copied: Path) -> None
     assert all(run.identity for run in grown.runs)
 
 
-def test_versions_stand_in_plan_run_and_card(copied: Path) -> None:
-    """Each has the fingerprint of the robot and the hashes of task, helper and method."""
+def test_plan_run_and_card_contain_identities(copied: Path) -> None:
+    """They contain the robot's fingerprint and the hashes of the task, its goal and the method."""
     plan = plan_of("shared")
     method = f"method {plan.arms[1]}"
     assert set(plan.identity) == {"source", "target", method}
@@ -149,7 +149,7 @@ def test_versions_stand_in_plan_run_and_card(copied: Path) -> None:
 
 
 def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
-    """A run compares versions before and after, so a different version on a node ends it too."""
+    """A run compares identities at its start and at its end, also on other nodes of a cluster."""
     plan = plan_of("shared")
     (copied / "b.xml").write_text(XML.format(0.5))
     run = Run("scratch", 0)
@@ -157,13 +157,13 @@ def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
     with pytest.raises(ForeignStudy, match=r"b\.xml.*: its model has changed from \w+ to \w+"):
         perform_run(plan, run, "study", None, lambda steps: None)
     assert snapshot(copied / "study") == before
-    require_planned(plan, Run("source", 0))  # The source's has not changed.
+    require_planned(plan, Run("source", 0))  # The source has not changed.
     with pytest.raises(ForeignStudy, match="An env or code of this study has changed"):
         study_of(plan, Path("new"))
 
 
 def test_a_run_of_another_version_is_refused(copied: Path) -> None:
-    """A run of another version is refused, even if its folder was copied into the study."""
+    """This can happen if the folder of a run is copied into the study."""
     plan = plan_of("shared")
     path = copied / "study" / "runs" / "scratch-0" / "run.json"
     result = msgspec.json.decode(path.read_bytes())
@@ -182,7 +182,7 @@ def test_folders_of_two_versions_are_not_merged(copied: Path) -> None:
 
 
 def test_a_suite_has_one_version_of_each_robot(copied: Path) -> None:
-    """Another study of the suite does not share runs with an edited robot, nor its table."""
+    """A study of an edited robot cannot join a suite with runs of the old robot."""
     Path("suite").mkdir()
     Path("study").rename("suite/a-to-b")
     (copied / "b.xml").write_text(XML.format(0.5))
@@ -193,7 +193,6 @@ def test_a_suite_has_one_version_of_each_robot(copied: Path) -> None:
 
 
 def test_a_given_policy_of_an_edited_robot_is_refused(copied: Path) -> None:
-    """A zero-shot transfer would run another robot."""
     policy = Run("source", 0).policy_file(Path("study"))
     arms = ("scratch", "zero-shot")
     plan_of("shared", source_policy=policy, source_steps=None, arms=arms)
@@ -269,7 +268,7 @@ class Patient(Method):
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two packages of others with an entry point each."""
+    """Two packages with one entry point each: a learner and a method."""
     (tmp_path / "a_learner.py").write_text(_LEARNER)
     (tmp_path / "a_method.py").write_text(_METHOD)
     monkeypatch.syspath_prepend(tmp_path)
@@ -292,10 +291,8 @@ def _study(out: Path, arms: tuple[str, ...]) -> Study:
     return run_study(plan, out, executor=Serial())
 
 
-def test_a_study_runs_with_a_learner_and_a_method_of_others(
-    installed: None, tmp_path: Path
-) -> None:
-    """The plan is read back, so that it can be resumed, and nothing runs twice."""
+def test_a_study_uses_parts_of_other_packages(installed: None, tmp_path: Path) -> None:
+    """The plan is read again, so that the study resumes, and no run is repeated."""
     arms = ("scratch", "zero-shot", "fine-tune", "patient")
     study = _study(tmp_path / "study", arms)
     assert [e.steps for e in study.of("patient")[0].curve] == [0, 2, 4]

@@ -173,7 +173,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 class Run(msgspec.Struct, frozen=True):
     """One training or one evaluation, which is one sample in the statistics.
 
-    The kind is a method, "source", "random" or "zero-action"; the index is that of the seed.
+    The kind is a method, "source", "random" or "zero-action"; `index` counts the seeds from 0.
     """
 
     kind: str

@@ -80,7 +80,7 @@ MOTOR = _layout("motor")
             {"left/*": "copy eye*"},
             (Copy("eye*"), Copy("same")),
         ),
-        # As in `fnmatch`: `[]` and `[!]` stand for themselves, `[]]` and `[!a]` for a character.
+        # As in `fnmatch`: `[]` and `[!]` are literal, `[]]` and `[!a]` match a character.
         (
             ("a[]_1", "b[!]_2", "c]_3", "d]_4", "same"),
             ("x1", "x2", "y]3", "y]4", "same"),

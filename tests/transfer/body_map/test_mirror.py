@@ -77,7 +77,7 @@ MIXED = Layout((Feature("a", "m"), Feature("b", "rad"), Feature("c/x", "m")))
         (Layout((Feature("eye", "1", shape=(2, 2)),)), {}, [], MapError, "'eye' is a block of num"),
     ],
 )
-def test_what_is_no_symmetry_is_refused(
+def test_a_wrong_symmetry_is_refused(
     layout: Layout | None,
     swap: dict[str, str],
     flip: list[str],

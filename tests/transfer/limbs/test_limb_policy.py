@@ -17,7 +17,6 @@ from shapechanger.layout import Element, Feature, Layout
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.export import export_limbs
-from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.settings import LimbSettings
 from shapechanger.transfer.limbs.envs import (
@@ -34,7 +33,7 @@ from shapechanger.transfer.methods import basic
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 
-ANT = EnvRef("shapechanger/Ant-v1")
+ANT, EXTENDED = EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1")
 # Two of these have a foot, each on another leg, and two are of one layout.
 SOME: dict[str, Any] = {"bodies": {"split": "train", "count": 12}}
 
@@ -100,7 +99,7 @@ def test_envs_of_many_bodies_equal_single_ones() -> None:
 
 
 def test_room_adds_empty_rows() -> None:
-    """Rows of limbs that a body has not are zeros, and their actions do nothing."""
+    """Rows of missing limbs are zeros, and their actions have no effect."""
     own, roomy = _limb_env(), _limb_env(room=12)
     (few, _), (many, _) = own.reset(seed=1), roomy.reset(seed=1)
     np.testing.assert_array_equal(many[: few.size], few)
@@ -112,45 +111,47 @@ def test_room_adds_empty_rows() -> None:
 
 
 def test_bodies_by_name_or_drawn() -> None:
-    """`bodies` is a list of bodies, or says how to draw them; without it the env stands alone."""
+    """`bodies` lists bodies, or states how to draw them; without it there is one body."""
     assert each_body(ANT) == [ANT]
     listed = each_body(ANT.having({"bodies": ["Ant", "BigAnt"]}))
     assert [env.kwargs["body"] for env in listed] == ["Ant", "BigAnt"]
     assert len(each_body(ANT.having(SOME))) == 12
 
 
-def test_what_does_not_fit_is_refused() -> None:
+@pytest.mark.parametrize(
+    ("bodies", "message"),
+    [
+        ([], "needs at least one body"),
+        ({"counts": 3}, r"The bodies of shapechanger/Ant-v1 are wrong: .*`counts`"),
+        ({"split": "training"}, "split matches 'training'"),
+    ],
+)
+def test_wrong_bodies_are_refused(bodies: Any, message: str) -> None:
+    with pytest.raises((StudyError, UnknownName), match=message):
+        each_body(ANT.having({"bodies": bodies}))
+
+
+def test_unsuitable_envs_are_refused() -> None:
+    with pytest.raises(StudyError, match="belongs to no family to draw from"):
+        each_body(EnvRef("shapechanger/Finger-v1", {"bodies": {}}))
     with pytest.raises(StudyError, match="a body of 12 limbs, and the policy has room for 8"):
-        _limb_env(EnvRef("shapechanger/ExtendedAnt-v1"), room=8)
+        _limb_env(EXTENDED, room=8)
     with pytest.raises(StudyError, match="CartPole-v1 has no kinematic tree"):
         rows_of(gym.make("CartPole-v1"))
     with pytest.raises(StudyError, match="12 bodies need as many envs, and there are 4: give --se"):
         LimbVecEnv(ANT.having(SOME), 4)
-    with pytest.raises(StudyError, match="needs at least one body"):
-        each_body(ANT.having({"bodies": []}))
-    with pytest.raises(
-        StudyError, match=r"The bodies of shapechanger/Ant-v1 are wrong: .*`counts`"
-    ):
-        each_body(ANT.having({"bodies": {"counts": 3}}))
-    with pytest.raises(UnknownName, match="split matches 'training'"):
-        each_body(ANT.having({"bodies": {"split": "training"}}))
-    with pytest.raises(StudyError, match="belongs to no family to draw from"):
-        each_body(EnvRef("shapechanger/Finger-v1", {"bodies": {}}))
     with pytest.raises(StudyError, match="A reset cannot change the body behind its rows"):
         _limb_env().reset(options={"body": "BigAnt"})
     with pytest.raises(StudyError, match="These bodies have different columns"):
         rows_of_each([ANT, EnvRef("shapechanger/HalfCheetah-v1")])
     with pytest.raises(TransplantError, match="another family than shapechanger/HalfChe"):
         fitted(gym.make("shapechanger/HalfCheetah-v1"), _limb_env().observation_layout)
-    require_same_columns(
-        _limb_env().observation_layout,
-        _limb_env(EnvRef("shapechanger/ExtendedAnt-v1")).observation_layout,
-        "shapechanger/ExtendedAnt-v1",
-    )
+    layouts = (_limb_env(env).observation_layout for env in (ANT, EXTENDED))
+    require_same_columns(*layouts, EXTENDED.id)
 
 
 class _Strange(gym.Wrapper[Any, Any, Any, Any]):
-    """Env with other layouts than its own."""
+    """Env with given layouts."""
 
     def __init__(self, env: gym.Env[Any, Any], observation: Feature, action: Feature) -> None:
         super().__init__(env)
@@ -182,7 +183,6 @@ def test_the_last_observation_of_an_episode_is_a_row() -> None:
     envs.close()
 
 
-ANT, EXTENDED = EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1")
 FEW: Final = ANT.having({"bodies": {"count": 2}, "max_episode_steps": 20})
 TINY: Final = LimbSettings(
     n_envs=2,
@@ -207,7 +207,7 @@ def _learner(**changed: Any) -> LimbLearner:
 @pytest.fixture(scope="module")
 def policy() -> TrainedPolicy:
     """A policy that has hardly learned."""
-    return _learner().train(FEW, 32, 0, on_evaluation=lambda evaluation: None)
+    return _learner().train(FEW, 32, 0)
 
 
 def _net(policy: TrainedPolicy) -> LimbPolicy:
@@ -235,8 +235,7 @@ def test_limbs_may_come_in_any_order_and_number(policy: TrainedPolicy) -> None:
     )
 
 
-def test_limbs_without_a_motor_count_in_no_probability(policy: TrainedPolicy) -> None:
-    """Actions of such limbs change neither the probability of the others nor the entropy."""
+def test_limbs_without_a_motor_have_no_effect_on_probabilities(policy: TrainedPolicy) -> None:
     (env,) = limb_envs(EXTENDED.having({"body": "ExtendedAntPassive"}), 1)
     rows, _ = env.reset(seed=0)
     net = _net(policy)
@@ -253,49 +252,21 @@ def test_limbs_without_a_motor_count_in_no_probability(policy: TrainedPolicy) ->
     assert entropy.item() == pytest.approx(8 * one, rel=1e-5)
 
 
-def test_a_file_fits_any_body(policy: TrainedPolicy, tmp_path: Path) -> None:
-    """A saved policy acts in an ant that has more limbs than any that it was trained in."""
-    path = tmp_path / "ants.safetensors"
-    save_policy(policy, path)
-    loaded = load_policy(path)
-    assert loaded.card == policy.card
-    assert loaded.card.env == FEW
-    target = EXTENDED.having({"max_episode_steps": 20})
-    zero_shot = _learner().evaluate(target, loaded, _NO_MAP)
-    assert zero_shot == _learner().evaluate(target, policy, _NO_MAP)
-    found: list[Evaluation] = []
-    tuned = _learner().train(
-        target, 32, 1, start=loaded, body_map=_NO_MAP, on_evaluation=found.append
-    )
-    assert found[0].mean_return == zero_shot.mean_return
-    assert found[0].steps == 0
-    assert tuned.card.action.size == 12
-    assert tuned.card.start_log_std is not None
-
-
-def test_a_training_keeps_the_scale_of_its_rewards(policy: TrainedPolicy) -> None:
-    """Fine-tuning goes on with the statistics of the source, which its critic has learned with."""
-    assert policy.normalisation is not None
-    scale = policy.normalisation.reward
-    tuned = _learner().train(
-        FEW, 32, 1, start=policy, body_map=_NO_MAP, on_evaluation=lambda _: None
-    )
-    assert tuned.normalisation is not None
-    # Its own 32 steps are added to the source's.
-    assert tuned.normalisation.reward.count == pytest.approx(scale.count + 32)
-
-
-def test_training_and_acting_see_the_same_rows(policy: TrainedPolicy) -> None:
-    """Rows are scaled already: no running statistics change them in training alone."""
+def test_statistics_of_a_policy(policy: TrainedPolicy) -> None:
+    """Rows are already scaled; fine-tuning continues the statistics of the critic's returns."""
     assert policy.normalisation is not None
     assert not policy.normalisation.observation.mean.any()
     assert (policy.normalisation.observation.var == 1.0).all()
+    scale = policy.normalisation.reward
+    tuned = _learner().train(FEW, 32, 1, start=policy, body_map=_NO_MAP)
+    assert tuned.normalisation is not None
+    # The 32 steps of the fine-tuning are added to the steps of the source.
+    assert tuned.normalisation.reward.count == pytest.approx(scale.count + 32)
 
 
 def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
-    """The network trains on the same bodies, and is refused if the room differs."""
     learner = _learner(network="padded", room=9, net_arch=(8,))
-    trained = learner.train(FEW, 32, 0, on_evaluation=lambda _: None)
+    trained = learner.train(FEW, 32, 0)
     save_policy(trained, tmp_path / "padded.safetensors")
     loaded = load_policy(tmp_path / "padded.safetensors")
     assert learner.evaluate(FEW, loaded, _NO_MAP) == learner.evaluate(FEW, trained, _NO_MAP)
@@ -303,7 +274,7 @@ def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
         learner.evaluate(EXTENDED, loaded, _NO_MAP)
     with pytest.raises(TransplantError, match=r"padded for another number of limbs .*--set room"):
         _learner(network="padded", room=12, net_arch=(8,)).train(
-            EXTENDED, 32, 0, start=loaded, body_map=_NO_MAP, on_evaluation=lambda _: None
+            EXTENDED, 32, 0, start=loaded, body_map=_NO_MAP
         )
     with pytest.raises(StudyError, match="A padded network needs room"):
         msgspec.structs.replace(TINY, network="padded")
@@ -340,10 +311,8 @@ def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_onnx_of_a_body_equals_pytorch(tmp_path: Path) -> None:
-    """The exported policy takes the body's own observations, and gives its own actions."""
-    trained = _learner(network="padded", room=12, net_arch=(8, 8)).train(
-        FEW, 32, 0, on_evaluation=lambda _: None
-    )
+    """The exported policy maps observations of the body to its actions."""
+    trained = _learner(network="padded", room=12, net_arch=(8, 8)).train(FEW, 32, 0)
     with EXTENDED.make() as env:
         export_limbs(trained, env, EXTENDED, tmp_path / "ant.onnx")
         exported = load_policy(tmp_path / "ant.onnx")
@@ -353,4 +322,4 @@ def test_onnx_of_a_body_equals_pytorch(tmp_path: Path) -> None:
         seen = observation + np.random.default_rng(0).normal(0.0, 0.5, (20, observation.size))
         expected = acting.rows.actions(trained.act(acting.rows.of(seen)))
         np.testing.assert_allclose(exported.act(seen), expected, atol=1e-5)
-        assert np.ptp(expected, axis=0).max() > 1e-3  # It does not act the same everywhere.
+        assert np.ptp(expected, axis=0).max() > 1e-3  # Actions depend on observations.

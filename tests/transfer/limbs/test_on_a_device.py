@@ -1,4 +1,4 @@
-"""Policies on worlds of a device: the same rows, the same actions, the same files."""
+"""Policies trained on a device act as on the CPU, and have files of the same format."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from shapechanger.errors import StudyError
 from shapechanger.morphology import JointRange, to_json
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.export import export_limbs
-from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.rsl import RslLearner, RslVecEnv
@@ -44,8 +43,8 @@ def worlds(**arguments: Any) -> Any:
     return shapechanger.make_vec("InvertedPendulum", 4, backend="warp", device="cpu", **arguments)
 
 
-def test_a_short_training_balances_longer(tmp_path: Path) -> None:
-    """The return rises, and the policy in the file acts as the trained one, on the CPU env."""
+def test_a_short_training_raises_the_return(tmp_path: Path) -> None:
+    """The loaded policy acts as the trained one."""
     found: list[Evaluation] = []
     counted: list[int] = []
     learner = learner_of("rsl-ppo", SETTINGS)
@@ -65,9 +64,9 @@ def test_a_short_training_balances_longer(tmp_path: Path) -> None:
 
 
 def test_a_policy_of_any_number_of_worlds_is_loaded(tmp_path: Path) -> None:
-    """A device steps more worlds than there may be envs of other learners."""
+    """Policies of a device may have more worlds than other policies may have envs."""
     few = msgspec.structs.replace(SETTINGS, n_steps=2, batch_size=16, eval_every=16)
-    trained = RslLearner("rsl-ppo", few).train(PENDULUM, 16, 0, on_evaluation=ignore)
+    trained = RslLearner("rsl-ppo", few).train(PENDULUM, 16, 0)
     many = msgspec.structs.replace(SETTINGS, n_envs=8192, eval_every=2**20)
     trained.carded(settings=many).save(tmp_path / "many.safetensors")
     loaded = load_policy(tmp_path / "many.safetensors")
@@ -76,8 +75,7 @@ def test_a_policy_of_any_number_of_worlds_is_loaded(tmp_path: Path) -> None:
     np.testing.assert_array_equal(loaded.act(seen), trained.act(seen))
 
 
-def test_what_the_adapter_promises() -> None:
-    """Shapes, ends and `time_outs` are as rsl-rl reads them."""
+def test_worlds_have_the_interface_of_rsl_rl() -> None:
     envs = RslVecEnv(worlds(max_episode_steps=2), seed=0)
     assert (envs.num_envs, envs.num_actions, envs.max_episode_length) == (4, 1, 2)
     assert envs.get_observations()["policy"].shape == (4, 4)
@@ -93,13 +91,12 @@ def test_what_the_adapter_promises() -> None:
     assert envs.step(actions)[2].tolist() == [True, False, False, False]
 
 
-def test_what_it_refuses() -> None:
-    """The learner refuses callbacks, and budgets below one evaluation."""
+def test_callbacks_and_small_budgets_are_refused() -> None:
     learner = RslLearner("rsl-ppo", SETTINGS)
     with pytest.raises(StudyError, match="cannot use callbacks"):
-        learner.train(PENDULUM, 2048, 0, callback=object(), on_evaluation=print)
+        learner.train(PENDULUM, 2048, 0, callback=object())
     with pytest.raises(StudyError, match="is too small"):
-        learner.train(PENDULUM, 512, 0, on_evaluation=print)
+        learner.train(PENDULUM, 512, 0)
 
 
 ANT: Final = EnvRef("shapechanger/Ant-v1", {"max_episode_steps": 20})
@@ -138,7 +135,7 @@ def _worlds(bodies: list[str]) -> RslVecEnv:
 @pytest.fixture(scope="module")
 def policy() -> TrainedPolicy:
     """A policy of two ants that has hardly learned."""
-    return _learner().train(BOTH, 48, 0, on_evaluation=lambda evaluation: None)
+    return _learner().train(BOTH, 48, 0)
 
 
 def _net(policy: TrainedPolicy) -> LimbPolicy:
@@ -147,8 +144,8 @@ def _net(policy: TrainedPolicy) -> LimbPolicy:
     return net
 
 
-def test_actions_are_those_of_the_policy_in_every_body(policy: TrainedPolicy) -> None:
-    """In bodies of 12 and of 8 limbs rsl-rl's actor acts as the policy does on the CPU."""
+def test_networks_of_rsl_rl_equal_the_policy(policy: TrainedPolicy) -> None:
+    """In bodies of 12 and of 8 limbs they act as the policy does on the CPU."""
     worlds = _worlds(["ExtendedAnt", "Ant", "ExtendedAnt"])
     net = _net(policy)
     actor = LimbModel(net, net.actor_net, acts=True)
@@ -172,8 +169,8 @@ def test_actions_are_those_of_the_policy_in_every_body(policy: TrainedPolicy) ->
     assert values.shape == (3, 1)
 
 
-def test_probabilities_are_those_of_the_policy(policy: TrainedPolicy) -> None:
-    """Limbs that a body does not have, or that have no motor, count in no probability."""
+def test_probabilities_equal_the_policys(policy: TrainedPolicy) -> None:
+    """Limbs that a body lacks, and limbs without a motor, have no effect on probabilities."""
     worlds = _worlds(["ExtendedAnt", "Ant", "ExtendedAntPassive"])
     net = _net(policy)
     actor = LimbModel(net, net.actor_net, acts=True)
@@ -190,7 +187,7 @@ def test_probabilities_are_those_of_the_policy(policy: TrainedPolicy) -> None:
 
 
 def test_worlds_of_equal_spaces_and_several_batches() -> None:
-    """Rows and actions of all batches are one tensor, as in the vector env."""
+    """Rows and actions of all batches are in one tensor, as in the vector env."""
     bodies = ["Swimmer", to_json([JointRange("free_body_rot", -2.0, 2.0)])]
     swimmer = EnvRef("shapechanger/Swimmer-v1")
     envs = shapechanger.make_vec("Swimmer", 2, backend="warp", device="cpu", bodies=bodies)
@@ -209,7 +206,7 @@ def test_worlds_of_equal_spaces_and_several_batches() -> None:
 
 
 def test_training_changes_every_layer(policy: TrainedPolicy) -> None:
-    """Two updates in two bodies of differing spaces move all weights, and the curve says when."""
+    """Two updates in bodies with different spaces change all weights."""
     found: list[Evaluation] = []
     counted: list[int] = []
     trained = _learner().train(BOTH, 96, 0, on_evaluation=found.append, on_steps=counted.append)
@@ -220,13 +217,13 @@ def test_training_changes_every_layer(policy: TrainedPolicy) -> None:
         assert not torch.equal(weights, before[name]), name
     statistics = trained.normalisation
     assert statistics is not None
-    # Rows are scaled already; rewards are divided by the deviation of their returns.
+    # Rows are already scaled; rewards are divided by the deviation of their returns.
     assert (statistics.observation.var == 1.0).all()
     assert statistics.reward.count == pytest.approx(96, abs=1)
 
 
 def test_the_file_acts_in_an_unseen_body(policy: TrainedPolicy, tmp_path: Path) -> None:
-    """The file is loaded, evaluated, fine-tuned on either backend, and exported as any other."""
+    """It is loaded, evaluated, fine-tuned and exported, as any other policy file."""
     path = tmp_path / "ants.safetensors"
     save_policy(policy, path)
     loaded = load_policy(path)

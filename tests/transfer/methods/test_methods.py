@@ -21,7 +21,6 @@ from shapechanger.policy import load_policy
 from shapechanger.registry import METHODS
 from shapechanger.transfer.body_map import body_map
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import OffPolicySettings
@@ -69,26 +68,18 @@ def test_a_name_that_does_not_exist(no_other: dict[str, type[Method]]) -> None:
 def test_names_are_taken_once(no_other: dict[str, type[Method]]) -> None:
     """A second method of one name is refused; the same class again is not."""
 
+    def named(name: str) -> type[Method]:
+        return type(f"Named{name}", (Method,), {"name": name})
+
     class First(Method):
         name = "mine"
 
-    class Second(Method):
-        name = "mine"
-
-    class Random(Method):
-        name = "random"
-
-    class Spaced(Method):
-        name = "my method"
-
-    assert register(First) is First
-    assert register(First) is First
-    with pytest.raises(StudyError, match="already a method 'mine'"):
-        register(Second)
-    with pytest.raises(StudyError, match="already a method 'random'"):
-        register(Random)
+    assert register(First) is register(First) is First
+    for name in ("mine", "random"):
+        with pytest.raises(StudyError, match=f"already a method '{name}'"):
+            register(named(name))
     with pytest.raises(StudyError, match="must have only letters"):
-        register(Spaced)
+        register(named("my method"))
     assert isinstance(load_method("mine"), First)
     no_other["broken"] = Path  # type: ignore[assignment]
     with pytest.raises(StudyError, match="not a subclass of Method"):
@@ -161,7 +152,7 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
         TINY_NORMALISED, learning_rate=1e-2, n_steps=64, eval_every=512
     )
     plan = tiny_plan(settings, arms=("scratch", "kickstart"), steps=512, source_steps=512)
-    monkeypatch.setattr(training, "_UNTIL", 1e9)  # Weights are kept.
+    monkeypatch.setattr(training, "_UNTIL", 1e9)  # The weight does not fall.
     observations = np.random.default_rng(0).normal(0.0, 0.1, (200, 4))
     away: list[float] = []
     for weight in (0.0, 1.0):
@@ -244,18 +235,13 @@ def short(**more: Any) -> OffPolicySettings:
     return settings
 
 
-def test_a_study_with_both(tmp_path: Path) -> None:
-    """Both methods are evaluated at the steps of scratch, also with two envs."""
-    plan = tiny_plan(
-        short(n_envs=2),
-        steps=64,
-        source_steps=160,
-        arms=("scratch", "prefilled-replay", "off-dynamics"),
-    )
+def test_methods_with_replay_buffers_are_evaluated_at_the_steps_of_scratch(tmp_path: Path) -> None:
+    """Each learner has two envs."""
+    arms = ("scratch", "prefilled-replay", "off-dynamics")
+    plan = tiny_plan(short(n_envs=2), steps=64, source_steps=160, arms=arms)
     study = run_study(plan, tmp_path, executor=Serial())
-    wanted = study.curves("scratch").steps.tolist()
-    for arm in ("prefilled-replay", "off-dynamics"):
-        assert study.curves(arm).steps.tolist() == wanted == [0.0, 32.0, 64.0]
+    for arm in arms:
+        assert study.curves(arm).steps.tolist() == [0.0, 32.0, 64.0]
 
 
 def test_corrections_reward_target_like_steps() -> None:
@@ -278,9 +264,9 @@ def test_corrections_reward_target_like_steps() -> None:
     assert same.correction(*batch(1.0)).abs().mean() < 0.3
 
 
-def test_transitions_are_those_of_the_env() -> None:
+def test_transitions_follow_one_another() -> None:
     """Each transition starts where the last one ended, unless the episode ended."""
-    policy = Sb3Learner("sac", short()).train(SMALL, 32, 0, on_evaluation=_ignore)
+    policy = Sb3Learner("sac", short()).train(SMALL, 32, 0)
     seen = collect(SMALL, policy, 50, 3)
     assert seen.observations.shape == seen.next_observations.shape == (50, 4)
     goes_on = ~seen.terminated[:-1]
@@ -292,7 +278,7 @@ def test_transitions_are_those_of_the_env() -> None:
     np.testing.assert_array_equal(again.actions, seen.actions)
 
 
-def test_mapped_transitions_are_those_of_the_target() -> None:
+def test_mapped_transitions_have_the_target_layouts() -> None:
     crossing = body_map(ANT.make(), EXTENDED.make())
     seen, sees = crossing.source_observation, crossing.target_observation
     acts, does = crossing.source_action, crossing.target_action
@@ -321,10 +307,6 @@ def test_off_dynamics_needs_equal_spaces_and_plain_observations() -> None:
         tiny_plan(short(normalise=True), arms=("scratch", "off-dynamics"))
 
 
-def _ignore(evaluation: Evaluation) -> None:
-    del evaluation
-
-
 FINGER = EnvRef("shapechanger/Finger-v1", {"max_episode_steps": 50})
 REAL_LIKE = FINGER.having({"gap": "real-like"})
 _EVERY = (*ARMS, "randomised", "identified")
@@ -336,7 +318,7 @@ def gap(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[Any
     """A small study of the gap between fingers, its folder, and the identified fingers."""
     moved: list[Any] = []
 
-    # Identification has its own tests; here only the calls matter.
+    # Identification itself is tested elsewhere.
     def recorded(env: gym.Env[Any, Any], seconds: float, seed: int, actions: str) -> None:
         moved.append((env.get_wrapper_attr("parameters"), actions, seed))
 
@@ -433,7 +415,7 @@ def test_a_failed_evaluation_costs_no_training(
 
 
 def test_default_arms() -> None:
-    """A target that adapts the source gets all arms, other pairs the three basic ones."""
+    """All arms are included if the target adapts its source; otherwise the three basic ones."""
     assert default_arms(inspect_task(TransferTask(FINGER, REAL_LIKE))) == _EVERY
     assert default_arms(inspect_task(TransferTask(FINGER, FOLLOWS))) == ARMS
     assert default_arms(inspect_task(TransferTask(SMALL, BIG))) == ARMS

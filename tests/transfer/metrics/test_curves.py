@@ -75,7 +75,7 @@ def test_curves_are_straight_between_evaluations_and_hold_their_end() -> None:
 
 
 def test_area_weighs_uneven_evaluations() -> None:
-    """Trapezoids: (0 + 4)/2 · 10 + (4 + 2)/2 · 30 = 110, over 40."""
+    """The trapezoids are (0 + 4)/2 · 10 + (4 + 2)/2 · 30 = 110, divided by 40 steps."""
     curves = LearningCurves(np.array([0.0, 10.0, 40.0]), np.array([[0.0, 4.0, 2.0]]))
     np.testing.assert_allclose(curves.auc(), [2.75])
 
@@ -152,7 +152,7 @@ def test_a_shipped_reference_overrides_the_best_arm() -> None:
 
 
 def test_the_floor_is_scored_too() -> None:
-    """Counting source steps and scoring commute."""
+    """Scores of curves in total steps equal curves of scores in total steps."""
     reference = Reference(zero=-100.0, one=300.0)
     first_counted = reference.scores(in_total_steps(SCRATCH, 7, reference.zero))
     first_scored = in_total_steps(reference.scores(SCRATCH), 7, 0.0)

@@ -1,4 +1,4 @@
-"""The coverage that docstrings and docs/statistics.md state, measured."""
+"""Measurements of the coverage that docstrings and docs/statistics.md state."""
 
 from __future__ import annotations
 

@@ -118,17 +118,17 @@ def test_ratio_over_too_little_is_undefined() -> None:
 @pytest.mark.parametrize(
     ("arm", "scratch"),
     [
-        # Below the least that may be divided by in one resample of ten.
+        # In one resample of ten, scratch is below the smallest divisor that is allowed.
         (ARM, np.array([0.5, 0.4, -2.0, 1.5])),
-        # So far below it in eight of 27 that the ratio is beyond what floats can hold.
+        # In eight resamples of 27, scratch is so small that the ratio overflows.
         (ARM, np.array([0.5, 1e-310, 1e-310])),
-        # Both seeds the same in half the resamples of each arm.
+        # In half the resamples of each arm, both seeds are the same.
         (ARM[:2], SCRATCH[:2]),
-        # Scratch shows no spread, and the arm none in one resample of nine, up to rounding.
+        # Scratch has no spread, and up to rounding the arm has none in one resample of nine.
         (np.array([0.1, 0.2, 0.7]), np.full(5, 0.5)),
-        # Three zeros of five seeds: a ratio of zero without an error in one resample of thirteen.
+        # Three of five seeds are zero: in one resample of thirteen all are, without spread.
         (np.array([0.0, 0.0, 0.0, 0.1, 0.2]), SCRATCH),
-        # Only zeros: a ratio of exactly zero, without an error.
+        # All seeds are zero: the ratio is exactly zero, without spread.
         (np.zeros(5), SCRATCH),
     ],
     ids=["undefined", "overflow", "two seeds", "one arm without spread", "some zeros", "all zeros"],
@@ -136,7 +136,7 @@ def test_ratio_over_too_little_is_undefined() -> None:
 def test_unusable_resamples_are_not_dropped(
     arm: NDArray[np.float64], scratch: NDArray[np.float64]
 ) -> None:
-    """If unusable resamples may fill a tail there is no interval, but a note."""
+    """If the unusable resamples could fill a tail, there is a note instead of an interval."""
     estimate = ratio(arm, scratch)
     assert estimate.value == pytest.approx(arm.mean() / scratch.mean())
     assert (estimate.low, estimate.high, estimate.method) == (None, None, "none")
@@ -162,7 +162,7 @@ def test_the_middle_half_is_averaged() -> None:
 
 
 def test_improvement_matches_mann_whitney() -> None:
-    """U over the number of pairs, averaged over studies; equal runs count half."""
+    """It is U divided by the number of pairs, averaged over studies; equal runs count half."""
     rng = np.random.default_rng(1)
     arm, scratch = rng.normal(0.5, 1.0, 7), rng.normal(0.0, 1.0, 5)
     one = probability_of_improvement([arm], [scratch], rng=_rng())

@@ -27,7 +27,7 @@ from shapechanger.transfer.metrics.measures import (
 )
 
 STEPS = np.array([0.0, 10.0, 20.0, 40.0])
-# Mean scratch 0.1, 0.2, 0.4, 0.8 and mean arm 0.4, 0.6, 0.8, 1.0.
+# The mean over seeds of scratch is 0.1, 0.2, 0.4, 0.8, of the arm 0.4, 0.6, 0.8, 1.0.
 SCRATCH = LearningCurves(STEPS, np.array([[0.0, 0.1, 0.4, 0.7], [0.2, 0.3, 0.4, 0.9]]))
 ARM = LearningCurves(
     STEPS, np.array([[0.3, 0.6, 0.9, 1.0], [0.4, 0.6, 0.8, 1.0], [0.5, 0.6, 0.7, 1.0]])
@@ -40,7 +40,7 @@ def ratio(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
 
 
 def test_jumpstart() -> None:
-    """0.4 - 0.1 at the first evaluation, and Welch's interval around it."""
+    """The gain at the first evaluation is 0.4 - 0.1, with Welch's interval."""
     estimate = jumpstart(ARM, SCRATCH)
     assert estimate.value == pytest.approx(0.3)
     assert estimate.method == "Welch's t"
@@ -53,7 +53,7 @@ def test_jumpstart() -> None:
     [(0, 0.1), (5, 0.15), (10, 0.2), (30, 0.6), (40, 0.8), (1000, 0.8)],
 )
 def test_jumpstart_in_total_steps(source_steps: int, scratch_by_then: float) -> None:
-    """Scratch is read at the source steps, or at its end if that is earlier."""
+    """The arm is compared with scratch at the source steps, or at the end of scratch."""
     estimate = jumpstart(in_total_steps(ARM, source_steps, 0.0), SCRATCH)
     assert estimate.value == pytest.approx(0.4 - scratch_by_then)
 
@@ -75,27 +75,27 @@ def test_the_last_evaluations_must_exist(last_k: int) -> None:
     [
         # The arm at 20 and 40 equals its values at 15 and 35: 0.7 and 0.95.
         (5, (0.7 + 0.95) / 2 - 0.6),
-        # The floor at 20, and at 40 what it was at 10.
+        # At 20 steps the arm has the floor, and at 40 its value of target step 10.
         (30, (0.0 + 0.6) / 2 - 0.6),
-        # At the horizon the source is just finished.
+        # The source training ends at the horizon.
         (40, (0.0 + 0.4) / 2 - 0.6),
         # The source takes the whole budget.
         (41, -0.6),
     ],
 )
 def test_asymptotic_gain_in_total_steps(source_steps: int, gain: float) -> None:
-    """The end is the budget's, which includes source steps."""
+    """The curves end with the budget, which includes source steps."""
     total = in_total_steps(ARM, source_steps, floor=0.0)
     assert asymptotic_gain(total, SCRATCH, last_k=2).value == pytest.approx(gain)
 
 
 def test_total_reward_gain() -> None:
-    """Areas 5 + 7 + 18 = 30 and 1.5 + 3 + 12 = 16.5, over 40 steps."""
+    """The areas are 5 + 7 + 18 = 30 and 1.5 + 3 + 12 = 16.5, divided by 40 steps."""
     assert total_reward_gain(ARM, SCRATCH).value == pytest.approx((30.0 - 16.5) / 40.0)
 
 
 def test_auc_ratio() -> None:
-    """30 over 16.5, with a bootstrap interval once there are enough seeds."""
+    """The ratio is 30 / 16.5, with a bootstrap interval if there are enough seeds."""
     assert ratio(ARM, SCRATCH).value == pytest.approx(30.0 / 16.5)
     twice = [LearningCurves(STEPS, np.tile(c.returns, (2, 1))) for c in (ARM, SCRATCH)]
     estimate = ratio(*twice)
@@ -121,7 +121,7 @@ def test_zero_shot_has_a_start_and_an_end() -> None:
 
 
 def test_zero_shot_of_one_seed_keeps_both_reasons() -> None:
-    """The note states both that it is not trained and that there is no interval."""
+    """The note states that zero-shot is not trained, and that there is no interval."""
     one = LearningCurves(np.array([0.0]), np.array([[0.5]]))
     note = asymptotic_gain(one, SCRATCH, last_k=1).note
     assert "not trained" in note
@@ -148,16 +148,16 @@ def test_every_measure_refuses_other_evaluations(
         measure(shorter, SCRATCH)
 
 
-# Reach 0.5 at 5, at 30, never, and at 0 although it falls below again.
+# The seeds reach 0.5 at step 5, at 30, never, and at 0, where the curve falls again.
 LATE = LearningCurves(
     STEPS, np.array([[0, 1.0, 1.0, 1.0], [0, 0, 0, 1.0], [0, 0.2, 0.4, 0.3], [0.5, 0.0, 0.0, 0.9]])
 )
-# Reaches 0.5 at 40 and never.
+# The seeds reach 0.5 at step 40 and never.
 SLOW = LearningCurves(STEPS, np.array([[0, 0, 0, 0.5], [0, 0, 0, 0.4]]))
 
 
 def test_first_crossing_of_the_line() -> None:
-    """Linear between evaluations; reaching the threshold is enough; later falls do not count."""
+    """Curves are linear between evaluations; the first step at the threshold counts."""
     np.testing.assert_allclose(steps_to_reach(LATE, 0.5), [5.0, 30.0, math.inf, 0.0])
     np.testing.assert_allclose(steps_to_reach(SLOW, 0.5), [40.0, math.inf])
 
@@ -210,7 +210,7 @@ def transfer(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
     return forward_transfer(arm, scratch, rng=np.random.default_rng(0))
 
 
-# Areas 0.4 and 0.6, 0.5 on the mean; and 0.1 and 0.3, 0.2 on the mean.
+# The areas are 0.4 and 0.6 with mean 0.5, and 0.1 and 0.3 with mean 0.2.
 BETTER = curves((0.0, 0.4, 0.8), (0.2, 0.6, 1.0))
 WORSE = curves((0.0, 0.1, 0.2), (0.1, 0.3, 0.5))
 
@@ -230,7 +230,7 @@ def test_interval() -> None:
     assert estimate.low is not None
     assert estimate.high is not None
     assert 0.0 < estimate.low < estimate.value < estimate.high < 1.0
-    # Most seeds can do nearly everything at once: less than nothing might seem to be left.
+    # Most seeds are near the maximum, so the interval is clipped at 1.
     skewed = curves(*((h, h, h) for h in (0.99, 0.98, 1.0, 0.95, 0.2)))
     assert transfer(skewed, scratch).high == 1.0
 
@@ -264,7 +264,7 @@ def test_scores_must_be_clipped(outside: float) -> None:
 
 
 REFERENCE = Reference(zero=-100.0, one=300.0)
-# In scores: 0, 0.5, 1 on the mean; and 0.5, 1, 1.5.
+# The mean scores are 0, 0.5, 1 and 0.5, 1, 1.5.
 RETURNS = LearningCurves(THREE, np.array([[-120.0, 90.0, 290.0], [-80.0, 110.0, 310.0]]))
 ARM_RETURNS = LearningCurves(THREE, np.array([[90.0, 280.0, 510.0], [110.0, 320.0, 490.0]]))
 UNTRAINED = LearningCurves(np.array([0.0]), np.array([[90.0], [110.0]]))
@@ -279,7 +279,7 @@ def summary(
 
 
 def test_target_steps_by_hand() -> None:
-    """Gains of 0.5, and areas of 1 and 0.5."""
+    """The gains are 0.5, and the areas 1 and 0.5."""
     measured = summary().in_target_steps
     assert measured.jumpstart.value == pytest.approx(0.5)
     assert measured.asymptotic_gain.value == pytest.approx(0.5)

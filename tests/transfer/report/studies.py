@@ -1,4 +1,4 @@
-"""Synthetic studies: curves are drawn from a seed, and all else follows from them."""
+"""Synthetic studies, whose curves are drawn from a seed."""
 
 from __future__ import annotations
 

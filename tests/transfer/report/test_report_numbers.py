@@ -50,7 +50,7 @@ def test_the_sign_is_that_of_the_rounded_number() -> None:
 def test_intervals_have_two_significant_digits(
     low: float, value: float, high: float, text: str
 ) -> None:
-    """Digits follow from the width; an end is shown as zero only if its first six digits are."""
+    """Digits depend on the width; an end other than zero has up to six decimals to show it."""
     assert interval_text(value, low, high) == text
 
 

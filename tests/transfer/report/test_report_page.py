@@ -31,7 +31,7 @@ VOID = {"meta", "img"}
 
 
 class Reader(HTMLParser):
-    """Words, attributes, headings and tags of a page, of which every tag must be closed."""
+    """Words, attributes, headings and tags of a page; every tag must be closed."""
 
     def __init__(self, page: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -69,10 +69,8 @@ def test_the_page_is_self_contained(page: str) -> None:
     sources = [value for name, value in read.attributes if name in {"src", "href", "srcset"}]
     assert len(sources) == 2
     assert all(source.startswith("data:image/svg+xml;base64,") for source in sources)
-    assert "url(" not in page
-    assert "@import" not in page
-    assert "http://" not in page
-    assert "https://" not in page
+    for external in ("url(", "@import", "http://", "https://"):
+        assert external not in page
 
 
 def test_numbers_match_the_table(study: Study, page: str) -> None:
@@ -124,7 +122,7 @@ def test_the_body_map_is_summarised(page: str) -> None:
 
 
 def test_reward_terms_have_a_table(page: str) -> None:
-    """The table has a column per kind of run, and is left out without terms."""
+    """The table has a column for each kind of run; a study without terms has no table."""
     assert "forward 469.4 5 2.500 440.3 200 502.3" in Reader(page).words
     assert "Reward terms" not in Reader(study_html(make_study())).words
 
@@ -246,8 +244,8 @@ def test_methods_are_compared_by_target_and_over_all(suite_page: str) -> None:
 
 
 @pytest.mark.parametrize("seeds", [2, 5])
-def test_no_interval_that_is_none(seeds: int) -> None:
-    """Two runs, or runs that are all better, give no interval of a bootstrap."""
+def test_undefined_bootstrap_intervals_are_omitted(seeds: int) -> None:
+    """They are undefined for two runs, and if all runs of an arm are better."""
     better, worse = rising(900.0, 950.0, 3e3), rising(0.0, 100.0, 3e3, seed=1)
     study = make_study(scratch=worse[:seeds], fine_tune=better[:seeds])
     words = Reader(suite_html("a", {"a": study}, seeds=seeds)).words
@@ -306,11 +304,8 @@ def test_names_of_a_suite_are_escaped() -> None:
 def test_without_learning_there_are_no_scores() -> None:
     """The table is empty, and the verdict counts the study as showing nothing."""
     flat = rising(0.0, 0.0, 1e3, noise=0.0)
-    studies = {
-        "a": make_study(
-            scratch=flat, fine_tune=flat, zero_shot=flat[:, :1], random=np.zeros((5, 1))
-        )
-    }
+    none = {"zero_shot": flat[:, :1], "random": np.zeros((5, 1))}
+    studies = {"a": make_study(scratch=flat, fine_tune=flat, **none)}
     words = Reader(suite_html("flat", studies, seeds=5)).words
     assert "1 show nothing" in words
 

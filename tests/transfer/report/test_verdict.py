@@ -112,7 +112,7 @@ def test_caveats_name_limits_of_the_study() -> None:
 
 
 def test_runs_on_different_devices_are_a_caveat() -> None:
-    """Each device is named with what learned on it; runs that learned nothing name none."""
+    """The caveat names the kinds of runs that were trained on each device."""
     study = make_study(source_steps=0)
     assert machine_text([study]) == study.machine
     places = {"scratch": "CPU", "fine-tune": "NVIDIA H100"}

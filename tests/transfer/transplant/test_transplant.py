@@ -169,13 +169,9 @@ def computed(model: Model, z: NDArray[np.float64], u: NDArray[np.float64] | None
 def expected(
     source: Model, body_map: BodyMap, observation: NDArray[np.float64], u: NDArray[np.float64]
 ) -> tuple[Numbers, NDArray[np.float64]]:
-    """Return the source's outputs through the map, and which actions copy something.
+    """Return the source's outputs through the map, and which actions copy an action.
 
-    Args:
-        source: The trained model.
-        body_map: The map.
-        observation: What the target senses.
-        u: Target actions to judge.
+    `observation` and `u` are observations and actions of the target; critics evaluate `u`.
     """
     z = sensed(source, body_map.adapt_observation(observation))
     numbers = computed(source, z, back_to_source(body_map, u))
@@ -356,7 +352,7 @@ def test_critics_use_the_equal_name_or_the_mean() -> None:
     target = transplant(source, body_map, targets(body_map))
     rng = np.random.default_rng(0)
     z, u = rng.normal(size=(8, 4)), rng.uniform(-1.0, 1.0, size=(8, 5))
-    # A lost motor stands still: at the action 0, here the end of its range.
+    # A lost motor has the action 0, here an end of its range.
     judged = np.stack([0.5 * (u[:, 0] + u[:, 1]), u[:, 3], -np.ones(8)], axis=1)
     theirs, ours = computed(source, z, judged), computed(target, z, u)
     for name in ("q 0", "q 1", "target q 0", "target q 1"):
