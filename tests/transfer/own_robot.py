@@ -6,12 +6,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
+from tests.transfer.studies import TINY
 
 XML = """
 <mujoco><worldbody><body name="load">
@@ -35,17 +37,8 @@ from shapechanger.transfer.methods.basic import FineTune
 class Warm(FineTune):
     name = "{name}-warm"
 """
-TINY = PpoSettings(
-    n_envs=1,
-    n_steps=8,
-    batch_size=8,
-    n_epochs=1,
-    learning_rate=1e-3,
-    net_arch=(4,),
-    steps=8,
-    eval_every=8,
-    eval_episodes=1,
-)
+_STEPS = dict.fromkeys(("n_steps", "batch_size", "steps", "eval_every"), 8)
+ONE_UPDATE = msgspec.structs.replace(TINY, n_envs=1, net_arch=(4,), eval_episodes=1, **_STEPS)
 
 
 def write_project(folder: Path, name: str) -> None:
@@ -74,7 +67,7 @@ def task_of(name: str) -> TransferTask:
 def plan_of(name: str, seeds: int = 2, **more: Any) -> Plan:
     arms = ("scratch", f"{name}_method:{name}-warm")
     given = {"seeds": seeds, "steps": 8, "source_steps": 8, "arms": arms, **more}
-    return make_plan(given.pop("task", task_of(name)), "tiny", TINY, **given)
+    return make_plan(given.pop("task", task_of(name)), "tiny", ONE_UPDATE, **given)
 
 
 def study_of(plan: Plan, out: Path) -> Study:

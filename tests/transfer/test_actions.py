@@ -24,9 +24,8 @@ from shapechanger.transfer.export import export_onnx
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import SpacesOnly
 from shapechanger.transfer.learners.presets import resolve_learner
-from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.learners.vec_env import ThreadVecEnv, training_vec_env
+from shapechanger.transfer.runs import learner_of
 from shapechanger.transfer.transplant import transplant
 from tests.envs.vector.sameness import require_same
 from tests.transfer.test_learners import SHORT
@@ -58,19 +57,13 @@ def _ref(folder: Path, unit: str, actuator: str) -> EnvRef:
     return EnvRef("shapechanger/OwnRobot-v1", {"path": str(file), **task})
 
 
-def _learner(name: str) -> tuple[Sb3Learner, Sb3Settings]:
+def _trained(folder: Path, name: str, unit: str, actuator: str) -> tuple[Any, list[Evaluation]]:
     changed = SHORT if name == "sac" else {**_PPO, "eval_episodes": 2, "net_arch": [8]}
     _, settings = resolve_learner(name, changed)
-    assert isinstance(settings, Sb3Settings)
-    return Sb3Learner(name, settings), settings
-
-
-def _trained(folder: Path, name: str, unit: str, actuator: str) -> tuple[Any, list[Evaluation]]:
-    learner, settings = _learner(name)
     curve: list[Evaluation] = []
+    train = learner_of(name, settings).train
     env = _ref(folder, unit, actuator)
-    policy = learner.train(env, settings.steps, 0, on_evaluation=curve.append)
-    return policy, curve
+    return train(env, settings.steps, 0, on_evaluation=curve.append), curve
 
 
 @pytest.mark.parametrize(

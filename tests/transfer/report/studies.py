@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,25 +12,16 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.metrics.curves import LearningCurves, Reference
 from shapechanger.transfer.metrics.measures import Summary, summarise
 from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
+from tests.transfer.studies import TINY
 
 STEPS = np.linspace(0, 10_240, 11)
 
-SETTINGS = PpoSettings(
-    n_envs=4,
-    n_steps=64,
-    batch_size=64,
-    n_epochs=2,
-    learning_rate=1e-3,
-    steps=10_240,
-    eval_every=1024,
-    eval_episodes=5,
-)
+SETTINGS = msgspec.structs.replace(TINY, n_envs=4, n_steps=64, steps=10_240, eval_every=1024)
 
 
 def rising(

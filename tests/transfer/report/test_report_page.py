@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from html.parser import HTMLParser
 from itertools import permutations
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import imageio.v3 as imageio
 import msgspec
@@ -24,6 +25,9 @@ from shapechanger.transfer.report.suite import FilmStrip, Sweep, suite_html
 from shapechanger.transfer.report.verdict import measure_rows, verdict
 from shapechanger.transfer.study import Study
 from tests.transfer.report.studies import make_study, rising
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 FLAT = rising(-50.0, -50.0, 1e3)
 EVIL = "<script>alert(1)</script>&\"'"
@@ -209,10 +213,9 @@ def pairs() -> Mapping[str, Study]:
     """Six pairs of three ants; transfer hurts from BigAnt to Ant and helps elsewhere."""
     studies: dict[str, Study] = {}
     for source, target in permutations(ANTS, 2):
-        worse = rising(-200.0, 100.0, 3000.0, seed=3)
-        study = make_study(source=source, target=target)
-        if (source, target) == (ANTS[1], ANTS[0]):
-            study = make_study(source=source, target=target, fine_tune=worse)
+        hurts = (source, target) == (ANTS[1], ANTS[0])
+        more = {"fine_tune": rising(-200.0, 100.0, 3000.0, seed=3)} if hurts else {}
+        study = make_study(source=source, target=target, **more)
         studies[f"{source.id[13:-3]}-to-{target.id[13:-3]}"] = study
     return MappingProxyType(studies)
 
@@ -316,3 +319,24 @@ def test_drawings_are_reproducible(study: Study) -> None:
     assert drawing == learning_curves(study, "target")["target"]
     assert "<dc:date>" not in drawing
     assert "<metadata>" not in drawing
+
+
+# Left edges of the parts of each cell, relative to the cell, pixels.
+PARTS = """
+() => [...document.querySelectorAll("td[data-label] > *")].map(part =>
+  part.getBoundingClientRect().left - part.parentElement.getBoundingClientRect().left)
+"""
+
+
+@pytest.mark.system
+def test_values_are_next_to_their_labels_on_a_phone(chromium: Browser, page: str) -> None:
+    """At 390 pixels each number and its interval are right of the label, 7 rem wide."""
+    shown = chromium.new_page(viewport={"width": 390, "height": 844})
+    try:
+        shown.set_content(page)
+        assert shown.evaluate("document.documentElement.scrollWidth") == 390
+        lefts = shown.evaluate(PARTS)
+    finally:
+        shown.close()
+    assert lefts
+    assert min(lefts) >= 7 * 16

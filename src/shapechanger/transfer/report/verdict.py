@@ -110,10 +110,10 @@ def _reached(
 
 
 GOOD: Final = 0.9
-"""Share of the way from the value without skill to the best run from which a run has learned."""
+"""A run counts as good from this share of the way from the value without skill to the best run."""
 
 STRONG: Final = 0.8
-"""Share of success from which an arm counts as good on one individual, such as a finger."""
+"""Success rate from which an arm counts as strong on an individual, such as one finger."""
 
 
 class ArmRow(NamedTuple):
