@@ -250,32 +250,26 @@ def _source(log_std: float) -> TrainedPolicy:
     return policy
 
 
-def _tuned(source: TrainedPolicy, settings: Sb3Settings = _LONG) -> tuple[TrainedPolicy, Any]:
-    actions = _Actions()
-    same = BodyMap.identity(*source.card.layouts)
-    train = Sb3Learner("tiny", settings).train
-    policy = train(BIG, 512, 0, start=source, body_map=same, callback=actions)
-    return policy, actions.noise
-
-
 @pytest.mark.parametrize(
-    ("source", "start"), [(-4.0, START_LOG_STD), (-1.3, START_LOG_STD), (-0.3, -0.3)]
+    ("source", "of_new", "start"),
+    [
+        (-4.0, 0.0, START_LOG_STD),
+        (-1.3, 0.0, START_LOG_STD),
+        (-0.3, 0.0, -0.3),
+        (-4.0, -2.0, -2.0),
+    ],
 )
-def test_fine_tuning_explores(source: float, start: float, tmp_path: Path) -> None:
-    """A deviation below `START_LOG_STD` is raised to it; the card contains the first deviation."""
-    before = _source(source)
+def test_fine_tuning_explores(source: float, of_new: float, start: float, tmp_path: Path) -> None:
+    """A deviation is raised to `START_LOG_STD`, or to a new policy's; the card contains it."""
+    before, actions = _source(source), _Actions()
     assert before.card.start_log_std is None
-    policy, noise = _tuned(before)
+    train = Sb3Learner("tiny", msgspec.structs.replace(_LONG, log_std_init=of_new)).train
+    same = BodyMap.identity(*before.card.layouts)
+    policy = train(BIG, 512, 0, start=before, body_map=same, callback=actions)
     assert policy.card.start_log_std == (pytest.approx(start),)
-    assert noise.std() == pytest.approx(np.exp(start), rel=0.15)
+    assert actions.noise.std() == pytest.approx(np.exp(start), rel=0.15)
     save_policy(policy, tmp_path / "policy.safetensors")
     assert load_policy(tmp_path / "policy.safetensors").card == policy.card
-
-
-def test_a_start_policy_explores_no_more_than_a_new_policy() -> None:
-    """If new policies of a learner explore less, so does fine-tuning with this learner."""
-    policy, _ = _tuned(_source(-4.0), msgspec.structs.replace(_LONG, log_std_init=-2.0))
-    assert policy.card.start_log_std == (pytest.approx(-2.0),)
 
 
 FINGER = EnvRef("shapechanger/Finger-v1")
