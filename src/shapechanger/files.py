@@ -83,7 +83,7 @@ def require_file(path: Path) -> None:
 def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
     """Replace a file and flush it to disk; after an OutputError the old file is unchanged.
 
-    `mode` are the permissions of the new file; None for the permissions of the old file.
+    `mode` sets the permissions of the new file; None keeps the old file's.
     """
     with writing(path):
         if mode is None and path.exists():
@@ -94,7 +94,7 @@ def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
 def write_new(path: Path, content: bytes, mode: int | None = None) -> None:
     """Write a new file completely or not at all; raise OSError if it exists.
 
-    A missing folder is made. `mode` are its permissions; None for the default of the process.
+    A missing folder is made. `mode` sets its permissions; None for the default of the process.
     """
     if os.path.lexists(path):
         raise FileExistsError(path)

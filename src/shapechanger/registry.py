@@ -9,27 +9,25 @@ from __future__ import annotations
 import pkgutil
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final
 
 from shapechanger.errors import StudyError, UnknownName
 
-_Part = TypeVar("_Part")
 
-
-class Registry(Generic[_Part]):
+class Registry:
     """Parts of one kind, keyed by name.
 
-    `shipped` are the shipped parts as `module:attribute` below `shapechanger`, keyed by name. A
-    package adds parts as entry points of `group`, such as `shapechanger.methods`.
+    `shipped` contains the parts of Shapechanger as `module:attribute` below `shapechanger`. Other
+    packages add parts as entry points of `group`, such as `shapechanger.methods`.
     """
 
     def __init__(self, kind: str, group: str, shipped: dict[str, str]) -> None:
         self._kind = kind
         self._group = group
         self._places = shipped
-        self._registered: dict[str, _Part] = {}
+        self._registered: dict[str, Any] = {}
 
-    def register(self, name: str, part: _Part) -> None:
+    def register(self, name: str, part: Any) -> None:
         """Register a class as a part, by a new name of letters, digits, - and _."""
         title = getattr(part, "__name__", repr(part))
         if not name.replace("-", "").replace("_", "").isalnum():
@@ -55,7 +53,7 @@ class Registry(Generic[_Part]):
         """Return the names of parts that do not come with Shapechanger."""
         return frozenset(self.names()) - self._places.keys()
 
-    def load(self, name: str) -> _Part:
+    def load(self, name: str) -> Any:
         """Return a part by its name, or by `module:name` to import a module that registers it."""
         module, _, own = name.rpartition(":")
         if module:
@@ -72,7 +70,7 @@ class Registry(Generic[_Part]):
         raise UnknownName(self._kind, name, self.names())
 
 
-LEARNERS: Final[Registry[Any]] = Registry(
+LEARNERS: Final = Registry(
     "learner",
     "shapechanger.learners",
     {
@@ -87,7 +85,7 @@ LEARNERS: Final[Registry[Any]] = Registry(
 )
 """Classes of settings, subclasses of `shapechanger.transfer.learners.LearnerSettings`."""
 
-METHODS: Final[Registry[Any]] = Registry(
+METHODS: Final = Registry(
     "method",
     "shapechanger.methods",
     {
@@ -108,7 +106,7 @@ METHODS: Final[Registry[Any]] = Registry(
 )
 """Subclasses of `shapechanger.transfer.methods.Method`."""
 
-POLICIES: Final[Registry[Any]] = Registry(
+POLICIES: Final = Registry(
     "kind of policy",
     "shapechanger.policies",
     {
@@ -120,17 +118,17 @@ POLICIES: Final[Registry[Any]] = Registry(
 )
 """Functions that build a policy from the content of a file, keyed by kind of policy."""
 
-ROBOTS: Final[Registry[Any]] = Registry(
+ROBOTS: Final = Registry(
     "reader of robots", "shapechanger.robots", {"profile": "vehicles.twin:read_robot"}
 )
 """Functions that read a robot for its simulation, so that simulations do not import robots."""
 
-MODELS: Final[Registry[Any]] = Registry(
+MODELS: Final = Registry(
     "kind of model", "shapechanger.models", {"mujoco": "morphology.certificate.changes"}
 )
 """Modules that read the numbers of a compiled model, keyed by the library that compiled it."""
 
-MAKERS: Final[Registry[Any]] = Registry(
+MAKERS: Final = Registry(
     "maker of vector envs", "shapechanger.makers", {"make_vec": "envs.make_vec:make_vec"}
 )
 """Functions that make vector envs, so that learners do not import envs."""

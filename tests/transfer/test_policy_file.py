@@ -132,7 +132,7 @@ def test_unsuitable_numbers_are_refused(
     [
         ({"net_arch": [100_000, 100_000]}, "its card needs at least 10003800000 weights"),
         ({"net_arch": [-1]}, "negative dimension"),
-        ({"net_arch": [8]}, "size mismatch"),
+        ({"net_arch": [8]}, "Error(s) in loading state_dict"),
         ({"n_envs": 10**6, "eval_every": 10**9}, "1000000 envs, more than 4096"),
         ({"batch_size": -5}, "`batch_size` must be greater than 1"),
         ({"algorithm": "os:system", "type": "imported"}, "is a function"),

@@ -44,7 +44,7 @@ class DriveReward:
     def terms(
         self, speed_mps: float | None, collided: bool | None, stalled: bool | None, dt_s: float
     ) -> dict[str, float]:
-        """Return the terms of one step, whose sum is the reward; a term is left out if unknown.
+        """Return the terms of one step, whose sum is the reward, without unknown quantities.
 
         Args:
             speed_mps: Forward speed, m/s, negative backwards; None if it is not measured.

@@ -41,7 +41,7 @@ def count(value: float) -> str:
 def interval_text(
     value: float | None, low: float | None, high: float | None, *, signed: bool = False
 ) -> str:
-    """Format an estimate with its interval, as in `+0.31 [+0.22, +0.40]`; None if undefined."""
+    """Format an estimate, None if undefined, with its interval, as in `+0.31 [+0.22, +0.40]`."""
     if value is None:
         return UNDEFINED
     if low is None or high is None:

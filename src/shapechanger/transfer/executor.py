@@ -30,7 +30,7 @@ OnProgress = Callable[[str, int, bool], None]
 
 @dataclass(frozen=True)
 class Job:
-    """A call of a module-level function, with `arguments` and a `ReportSteps`, in a process.
+    """A call of a module-level function in a process, with `arguments` and a `ReportSteps`.
 
     The job starts when the jobs named in `after` have ended. If its process is lost, the job is
     repeated up to `attempts` times; a job that raises is not repeated.

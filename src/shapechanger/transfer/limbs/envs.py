@@ -29,8 +29,8 @@ from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns, row
 class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
     """An env whose observations are rows of numbers, and whose actions are one number per limb.
 
-    The env needs a property `tree`, its kinematic tree, whose limbs must not be more than `room`;
-    0 for as many rows as the body has limbs.
+    The env needs a property `tree`, its kinematic tree. `room` is the number of limbs with rows,
+    at least the body's number of limbs; 0 for this number.
     """
 
     def __init__(self, env: gym.Env[Any, Any], room: int = 0) -> None:
@@ -49,7 +49,7 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
         return self.rows.of(observation), info
 
     def step(self, action: NDArray[Any]) -> Any:
-        """Take one step with a number from -1 to 1 for each limb, without effect if motorless."""
+        """Take one step with a number from -1 to 1 for each limb, which motorless limbs ignore."""
         observation, *rest = self.env.step(self.rows.actions(action))
         return self.rows.of(observation), *rest
 
