@@ -31,7 +31,7 @@ from shapechanger.errors import HubError, PolicyError, ShapechangerError, StudyE
 from shapechanger.files import require_file, write_atomic
 from shapechanger.identity import identify_env, texts_in
 from shapechanger.policy import MAX_BYTES, STEERING, CloneNetwork, PolicyCard, load_policy
-from shapechanger.transfer.identities import ENV, known, single_body
+from shapechanger.transfer.identities import ENV, known
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.references import load_references
 from shapechanger.vehicles.expert import PERIOD_S
@@ -63,7 +63,7 @@ class _InEnv(_OfPolicy):
         if env is None:
             raise StudyError(f"{self.file} was trained on recordings that name no env: give --env.")
         # A policy for many bodies is shown in the family's default body.
-        trained_in = single_body(env)
+        trained_in = env.without("bodies")
         # The env, or its task, may come from a module of the user.
         allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
         if self.body and "path" in trained_in.kwargs:

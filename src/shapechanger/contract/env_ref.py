@@ -54,6 +54,10 @@ class EnvRef(msgspec.Struct, frozen=True):
         """Return the same env with additional or replaced arguments."""
         return EnvRef(self.id, {**self.kwargs, **more})
 
+    def without(self, argument: str) -> EnvRef:
+        """Return the same env without an argument."""
+        return EnvRef(self.id, {name: v for name, v in self.kwargs.items() if name != argument})
+
     def make(self, **more: Any) -> gym.Env[Any, Any]:
         """Make the env, with more arguments for this instance only, such as `render_mode`.
 
@@ -92,7 +96,7 @@ def each_body(env: EnvRef) -> list[EnvRef]:
     """
     if "bodies" not in env.kwargs:
         return [env]
-    one = EnvRef(env.id, {k: v for k, v in env.kwargs.items() if k != "bodies"})
+    one = env.without("bodies")
     given = env.kwargs["bodies"]
     if isinstance(given, Mapping):
         try:

@@ -36,14 +36,14 @@ def identify_learner(settings: object) -> Identity:
 
 def identities_in(ref: EnvRef, made: gym.Env[Any, Any], settings: object) -> Identities:
     """Return the identities of the env and the learner of a policy."""
-    one = single_body(ref)
-    env = steady(ref, identify_env(made, ref.id)) if one == ref else identify(ref)
+    is_single = "bodies" not in ref.kwargs
+    env = steady(ref, identify_env(made, ref.id)) if is_single else identify(ref)
     return known({ENV: env, LEARNER: identify_learner(settings)})
 
 
 def identify(ref: EnvRef) -> Identity:
-    """Make an env, and return its identity."""
-    with closing(single_body(ref).make()) as made:
+    """Make an env with a single body, and return its identity."""
+    with closing(ref.without("bodies").make()) as made:
         return steady(ref, identify_env(made, ref.id))
 
 
@@ -51,14 +51,9 @@ def steady(ref: EnvRef, found: Identity) -> Identity:
     """Return an identity, without its model if the env draws a new model each time it is made."""
     if not found.model or ref.id.startswith("shapechanger/"):
         return found
-    with closing(single_body(ref).make()) as made:
+    with closing(ref.without("bodies").make()) as made:
         again = identify_env(made, ref.id)
     return found if again == found else Identity(files=found.files)
-
-
-def single_body(ref: EnvRef) -> EnvRef:
-    """Return the env without the argument `bodies`, so that it has a single body."""
-    return EnvRef(ref.id, {name: v for name, v in ref.kwargs.items() if name != "bodies"})
 
 
 def require_same_env(

@@ -164,11 +164,10 @@ def bodies_in_turn(
 
 def together(bodies: Sequence[EnvRef]) -> EnvRef:
     """Combine references that differ in their body into one with the argument `bodies`."""
-    first = bodies[0]
-    kwargs = {name: value for name, value in first.kwargs.items() if name != "body"}
-    if "body" in first.kwargs:
-        kwargs["bodies"] = [body.kwargs["body"] for body in bodies]
-    return EnvRef(first.id, kwargs)
+    if "body" not in bodies[0].kwargs:
+        return bodies[0]
+    edits = [body.kwargs["body"] for body in bodies]
+    return bodies[0].without("body").having({"bodies": edits})
 
 
 def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:
