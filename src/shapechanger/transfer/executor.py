@@ -114,7 +114,7 @@ class Executor:
             )
 
     def _open(self, on_progress: OnProgress) -> None:
-        del on_progress
+        """Prepare to run jobs."""
 
     def _begin(self, job: Job) -> None:
         raise NotImplementedError

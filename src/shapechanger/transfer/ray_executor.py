@@ -43,7 +43,6 @@ class RayCluster(Executor):
         self._address = address
 
     def _open(self, on_progress: OnProgress) -> None:
-        del on_progress
         self._is_own = not _ray.is_initialized()
         if self._is_own:
             if self._address not in (None, "auto", "local"):

@@ -123,7 +123,6 @@ class RslLearner(Sb3Learner):
 
     def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:
         """Return an env that only has the model's spaces; `_learn` makes the worlds."""
-        del env
         spaces = SpacesOnly(one.observation_space, one.action_space)
         return DummyVecEnv([lambda: spaces])
 
@@ -164,7 +163,6 @@ class RslLearner(Sb3Learner):
         return env, None
 
     def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> RslTraining:
-        del rows
         return RslTraining(RslVecEnv(worlds, seed), model, statistics, self.settings)
 
 

@@ -145,7 +145,6 @@ class Sb3Learner(Learner[Sb3Settings]):
         progress: Progress,
     ) -> None:
         """Train a model for whole updates in the envs that it was built with."""
-        del env, envs
         try:
             cast("Any", model).learn(steps, callback=[*callbacks, progress])
         except ValueError as error:  # PyTorch refuses distributions of NaN.
@@ -184,13 +183,11 @@ class Sb3Learner(Learner[Sb3Settings]):
 
     def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:
         """Make the parallel envs of a training; `one` is one of the evaluation envs."""
-        del one
         return training_vec_env(env, self.settings.n_envs, self.threads)
 
     def _adapted(
         self, envs: list[gym.Env[Any, Any]], policy: TrainedPolicy, body_map: BodyMap
     ) -> list[gym.Env[Any, Any]]:
-        del policy
         return [MappedEnv(one, body_map) for one in envs]
 
     _normalises_observations = True

@@ -103,7 +103,6 @@ class LimbTraining(RslTraining):
     """rsl-rl's PPO with the weights of a policy of limbs."""
 
     def _networks(self, seen: TensorDict) -> tuple[Any, Any]:
-        del seen
         policy = self._model.policy
         return (
             LimbModel(policy, policy.actor_net, acts=True),

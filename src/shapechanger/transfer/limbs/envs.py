@@ -200,14 +200,12 @@ class LimbLearner(Sb3Learner):
         return limb_envs(env, self.settings.eval_episodes, self.settings.room)
 
     def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:
-        del one
         settings = self.settings
         return LimbVecEnv(env, settings.n_envs, threads=self.threads, room=settings.room)
 
     def _adapted(
         self, envs: list[gym.Env[Any, Any]], policy: TrainedPolicy, body_map: BodyMap
     ) -> list[gym.Env[Any, Any]]:
-        del body_map
         name = envs[0].spec.id if envs[0].spec else ""
         require_same_columns(policy.card.layouts[0], layouts_of(envs[0])[0], name)
         return envs
@@ -215,7 +213,6 @@ class LimbLearner(Sb3Learner):
     def _moved(
         self, source: TrainedPolicy, envs: VecEnv, card: PolicyCard, body_map: BodyMap
     ) -> BaseAlgorithm:
-        del body_map
         require_same_columns(source.card.layouts[0], card.layouts[0], card.trained_in.id)
         model = self._new_model(envs, card)
         try:

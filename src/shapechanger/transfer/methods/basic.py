@@ -236,7 +236,6 @@ class Randomised(AdaptedSource):
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
         """Require bodies of one family with equal layouts, or a target that states its range."""
-        del settings
         same_family = source.family and source.family == target.family
         if target.adapts_source or (same_family and source.same_layouts(target)):
             return
@@ -247,7 +246,6 @@ class Randomised(AdaptedSource):
 
     def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
         """Return the range of bodies."""
-        del seed
         if hasattr(target, "randomised_source"):
             return target.randomised_source()
         return source.arguments_between(target)
@@ -261,11 +259,9 @@ class Identified(AdaptedSource):
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
         """Refuse a target that cannot adapt its source."""
-        del source, settings
         if not target.adapts_source:
             raise self._lacks("a target that can adapt the source to itself, such as a finger")
 
     def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
         """Move the target, and return the identified parameters."""
-        del source
         return target.identified_source(seed)
