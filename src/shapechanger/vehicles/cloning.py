@@ -44,25 +44,17 @@ if TYPE_CHECKING:
 
 
 class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
-    """Settings of behavioural cloning, in which a step is a demonstrated step.
+    """Settings of behavioural cloning, in which a step is a demonstrated step."""
 
-    Attributes:
-        budgets: Numbers of demonstrated steps; a policy is trained on each, from the same start.
-        episode_steps: Steps of a demonstration; each is on another course.
-        eval_episodes: Episodes of an evaluation.
-        eval_steps: Steps of an evaluation episode.
-        clone: Settings of each training.
-    """
-
-    budgets: tuple[int, ...]
-    episode_steps: int
-    eval_episodes: int
-    eval_steps: int
+    budgets: tuple[int, ...]  # Numbers of steps; a policy is trained on each, from the same start.
+    episode_steps: int  # Steps of a demonstration; each demonstration is on another course.
+    eval_episodes: int  # Episodes of an evaluation.
+    eval_steps: int  # Steps of an evaluation episode.
     clone: CloneSettings = CloneSettings()
 
     takes = frozenset[Takes]({"demonstrations"})
     learner = f"{__name__}:CloneLearner"
-    last_k = 1  # Not a mean, because each evaluation is of a different clone.
+    last_k = 1  # Evaluations are not averaged, because each is of a different clone.
     source_steps = 0
 
     def __post_init__(self) -> None:
@@ -91,7 +83,7 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
         return self.eval_steps
 
     def for_budget(self, steps: int) -> CloningSettings:
-        """Return these settings, which are the same for a shorter budget."""
+        """Return these settings, which do not depend on the budget."""
         return self
 
     def rhythm(self) -> str:
@@ -210,11 +202,10 @@ class CloneLearner(Learner[CloningSettings]):
         on_evaluation: Callable[[Evaluation], None] = ignore,
         on_steps: Callable[[int], None] = lambda steps: None,
     ) -> CameraPolicy:
-        """Clone the demonstrator at each budget, from the same start, and evaluate each clone.
+        """Clone the demonstrator at each budget, or `only_last`, and return the last clone.
 
-        `demonstrations` is the file of the demonstrations. `only_last` skips all budgets but the
-        last. `rehearsed` is an env, a number of steps and a file of demonstrations to mix in. The
-        clone of the last budget is returned.
+        Each clone begins at the same start, and is evaluated. `rehearsed` is an env, a number of
+        steps and a file of demonstrations to mix in.
         """
         del body_map
         settings, own_seed = self.settings.clone, seed % 2**31
@@ -303,19 +294,11 @@ def train_student(
     settings: CloneSettings = STUDENT_CLONING,
     on_steps: Callable[[int], None] = lambda steps: None,
 ) -> CameraPolicy:
-    """Train a camera policy from a teacher.
+    """Train a camera policy for an env, such as `Car`, from a teacher, such as of `CarRanges`.
 
-    Args:
-        env: The student's env, such as `Car`.
-        teacher: A policy of the same vehicle that observes distances, such as one for `CarRanges`.
-        steps: Steps of driving: a third by the teacher, the others by the student.
-        seed: Seed of everything random.
-        settings: Settings with which the student clones the teacher.
-        on_steps: Called with the number of steps driven, after each episode.
-
-    Raises:
-        StudyError: If the env has no teachers, the policy is of another env, or there are fewer
-            steps than rounds.
+    The teacher drives a third of the steps, and the student the others. After each episode,
+    `on_steps` is called with the number of steps so far. Raises a StudyError if the teacher does
+    not fit the env.
     """
     if steps < 1 + _ROUNDS:
         raise StudyError(f"A student needs at least {1 + _ROUNDS} steps, got {steps}.")

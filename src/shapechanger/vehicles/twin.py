@@ -47,13 +47,9 @@ def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
 
 
 def place_of(profile: Profile, world: str = "", lenses: Sequence[str] = ()) -> Place:
-    """Return the place of a robot's twin: a course, or the plain room.
+    """Return the place of a robot's twin: a course with these camera faults, or the plain room.
 
-    Args:
-        profile: Profile of the robot.
-        world: Kind of course; "" for the vehicle's default, or for the room if the robot is not
-            one of the vehicles.
-        lenses: Names of camera faults.
+    `world` is a kind of course; by default the vehicle's home, or the room for another robot.
     """
     for lens in lenses:
         find_corruption(lens)

@@ -39,11 +39,11 @@ LEAST_THROTTLE: Final = 0.25
 
 _SLOWEST_MPS: Final = 0.3  # Below this, a measured speed hardly predicts the next turn.
 _AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
-# Numbers for `fit_response`: largest change of the steering within the lag, the lag of the turn, s,
-# the jitter of the steps' times, s, and the least share of the turning that steering must explain.
+# Constants of `fit_response`: largest change of a constant steering, lag of the turn, s, jitter of
+# the steps' times, s, and smallest share of the turning that the steering must explain.
 _CHANGE, _LAG_S, _JITTER_S, _EXPLAINED = 0.1, 0.1, 0.02, 0.5
 _ROUNDING: Final = 1e-9
-# Numbers for `measure_response`: seconds of driving, and steps between new random commands. The
+# Constants of `measure_response`: duration of the drive, s, and steps between random commands. The
 # first half of the steps after a new command is ignored, because the motion is still changing.
 _SECONDS, _HOLD = 5.0, 6
 _MOTION: Final = ("steering/applied", "speed", "yaw_rate")
@@ -72,12 +72,10 @@ class SteeringResponse:
 
 
 def measure_response(env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int) -> SteeringResponse:
-    """Measure how a vehicle turns, from 5 s of its own motion at random commands.
+    """Measure how a vehicle turns, from 5 s of its motion at random steering and throttle.
 
-    Args:
-        env: A vehicle with steering and throttle as its action. It is reset.
-        speed_at: Index of the speed, m/s, in the observed numbers.
-        yaw_rate_at: Index of the rate of turn, rad/s, positive to the left.
+    `speed_at` and `yaw_rate_at` are the indices of the speed, m/s, and of the rate of turn, rad/s,
+    positive to the left, in the observed numbers. The env is reset.
     """
     from scipy.optimize import nnls  # Not installed on robots, which do not measure themselves.
 
@@ -109,21 +107,13 @@ def fit_response(
     yaw_rate: NDArray[np.floating],
     times_s: NDArray[np.floating],
 ) -> SteeringResponse:
-    """Fit how a vehicle turns to one or more drives.
+    """Fit how a vehicle turns to one or more drives, or raise a StudyError.
 
-    The turn lags behind the steering, so steps count only if the steering has not changed for
-    0.1 s. The first steps of an episode or after a gap, and steps with an unmeasured value, do not
-    count.
-
-    Args:
-        steering: Applied steering, -1 to 1, positive to the right, shape (n,).
-        speed: Speed along the heading, m/s, shape (n,).
-        yaw_rate: Rate of turn, rad/s, positive to the left, shape (n,).
-        times_s: Time of each step since the start of its episode, s, shape (n,); an episode begins
-            where the time does not increase.
-
-    Raises:
-        StudyError: If steering does not explain enough of the turning.
+    Arguments have the shape (n,): applied steering, -1 to 1, positive to the right; speed along the
+    heading, m/s; rate of turn, rad/s, positive to the left; and time since the start of the
+    episode, s. An episode begins where the time does not increase. The turn lags behind the
+    steering, so a step counts only if all values are finite and the steering has not changed for
+    0.1 s, without a gap.
     """
     from scipy.optimize import nnls
 
@@ -141,12 +131,12 @@ def fit_response(
 
 
 def _is_steady(steering: NDArray[np.floating], times_s: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Return the mask of steps at which steering has not changed for the lag of the turn."""
+    """Return the mask of steps at which the steering has been constant for the lag of the turn."""
     passed_s = np.diff(times_s)
     usual_s = float(np.median(passed_s)) if len(passed_s) else 0.0
     jitter_s = min(0.5 * usual_s, _JITTER_S)
     whole = (passed_s > 0.0) & (passed_s <= max(_LAG_S + jitter_s, 1.5 * usual_s))
-    stretch = np.concatenate(([0], np.cumsum(~whole)))  # Number of the stretch without gaps.
+    stretch = np.concatenate(([0], np.cumsum(~whole)))  # Number of gaps before each step.
     _, begins = np.unique(stretch, return_index=True)
     steady = times_s - times_s[begins][stretch] >= _LAG_S - jitter_s
     for steps in range(1, len(steering)):
@@ -181,16 +171,9 @@ def command(
     """Return the steering and throttle that lead a vehicle to a waypoint `AHEAD_M` ahead.
 
     Pure pursuit: the circle through a point at the distance L and the bearing b has the curvature
-    2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992).
-
-    Args:
-        action: Bearing and speed, each from -1 to 1; values beyond are clipped.
-        response: How the vehicle turns.
-        speed: Speed along the heading, m/s.
-        on_the_spot: Whether the vehicle has tracks; full throttle would saturate one of them.
-
-    Raises:
-        SpaceMismatch: If the action is not two finite numbers.
+    2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992). The action, bearing and speed, is clipped
+    to -1 to 1. `speed` is the speed along the heading, m/s. `on_the_spot` is for a vehicle with
+    tracks, whose throttle is limited so that neither track saturates.
     """
     values = np.asarray(action, np.float64)
     if values.shape != (2,) or not np.isfinite(values).all():
@@ -231,11 +214,10 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
         *,
         turns_on_the_spot: bool,
     ) -> None:
-        """Wrap another env, whose actions are steering and throttle.
+        """Wrap another env, whose actions are steering and throttle, or raise an `error`.
 
-        `camera` is the pitch and vertical field of view, degrees, and the size of frames; None if
-        unknown. `sensors` are the names of required measurements, "speed" first. An `error` with
-        the name of the `robot` is raised if something is unknown or the camera sees too little.
+        `camera` is the pitch and vertical field of view, degrees, and the size of frames, each None
+        if unknown. `sensors` are the names of required measurements, "speed" first.
         """
         pitch, fovy, size = camera
         slices = env.observation_layout.slices
@@ -316,18 +298,13 @@ class WaypointLabels(NamedTuple):
 def waypoints_of(
     commands: NDArray[np.floating], response: SteeringResponse, speed: NDArray[np.floating]
 ) -> WaypointLabels:
-    """Return the waypoints that a driver's commands lead to, the inverse of `command`.
+    """Return the waypoints of steering and throttle, (n, 2), by the inverse of `command`.
 
     The steering determines the circle on which the vehicle drives. The waypoint is the point of the
-    circle at the distance `AHEAD_M`. At full steering, or if tracks turn on the spot, the driver
-    may have intended a wider bearing; the waypoint is the narrowest with the same command. The
-    throttle determines the speed. For throttles below `LEAST_THROTTLE`, including brakes, `command`
-    converts the speed to `LEAST_THROTTLE`.
-
-    Args:
-        commands: Steering and throttle, shape (n, 2); values beyond [-1, 1] are clipped.
-        response: How the vehicle turns.
-        speed: Speed along the heading, m/s, shape (n,); NaN if it was not measured.
+    circle at the distance `AHEAD_M`. At full steering, or if tracks turn on the spot, several
+    bearings have the same command, and the narrowest is returned. The throttle determines the
+    speed; `command` raises throttles below `LEAST_THROTTLE`, such as brakes, to `LEAST_THROTTLE`.
+    `speed` is the speed along the heading, m/s, (n,), NaN if it was not measured.
     """
     values = np.clip(np.asarray(commands, np.float64), -1.0, 1.0)
     steering, throttle = values.T
@@ -350,30 +327,19 @@ def waypoints_of(
 
 
 class WaypointDemonstrations(NamedTuple):
-    """Demonstrations with waypoints as actions.
-
-    `kept` is the mask of the given steps that were converted, shape (n,), `response` the response
-    of the vehicle to steering, and `notes` a summary for people.
-    """
+    """Demonstrations with waypoints as actions."""
 
     data: Dataset
-    kept: NDArray[np.bool_]
+    kept: NDArray[np.bool_]  # Mask of the given steps that were converted, shape (n,).
     response: SteeringResponse
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # Sentences that summarise the conversion.
 
 
 def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> WaypointDemonstrations:
-    """Return demonstrations of steering and throttle as demonstrations of waypoints.
+    """Convert demonstrations of steering and throttle, with rectified images, to waypoints.
 
-    Steps that do not determine a waypoint are left out; see `waypoints_of`.
-
-    Args:
-        data: The demonstrations, with rectified images.
-        response: How the vehicle turns; None to fit it to the recorded motion.
-
-    Raises:
-        DemosError: If the actions are not steering and throttle, there are no images, the response
-            or the speed is unknown, or no step determines a waypoint.
+    Steps that do not determine a waypoint are left out; see `waypoints_of`. Without a `response`,
+    it is fitted to the recorded motion. Raises a DemosError if nothing can be converted.
     """
     names = data.action_layout.names
     if names != ("steering", "throttle"):
@@ -407,12 +373,12 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
     notes = (
         f"The vehicle turns {response.per_metre:.2f} rad for each metre and "
         f"{response.per_second:.2f} for each second at full steering, {source}.",
-        f"{np.mean(~kept):.1%} of the steps are left out: it stands still, drives backward, or did "
-        "not measure its speed.",
+        f"{np.mean(~kept):.1%} of the steps are left out: the vehicle stands still, drives "
+        "backward, or did not measure its speed.",
         f"{np.mean(outside):.1%} of the waypoints are outside the image, which ends "
         f"{math.degrees(HALF_WIDTH_RAD):.0f} degrees to each side; "
-        f"{np.mean(labels.at_limit[kept]):.1%} are at the limit of the steering, so that the way "
-        "may be farther aside.",
+        f"{np.mean(labels.at_limit[kept]):.1%} are at the limit of the steering, so the driver may "
+        "have intended a wider bearing.",
     )
     converted = dataclasses.replace(
         data.part(kept),
@@ -427,7 +393,7 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
 def _fitted(
     columns: dict[str, NDArray[np.float64]], times_s: NDArray[np.floating]
 ) -> SteeringResponse:
-    """Fit the response to the recorded motion, keyed by name."""
+    """Fit the response to the recorded motion, (n,) keyed by name."""
     missing = [name for name in _MOTION if name not in columns]
     why = f"How the vehicle turns is unknown, because the recording lacks {', '.join(missing)}"
     if not missing:

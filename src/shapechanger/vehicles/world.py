@@ -36,19 +36,19 @@ _CHASSIS: Final = "vehicle/chassis"
 _INNER_OHM: Final = 0.12  # Resistance of the battery and its leads.
 _IDLE_A: Final = 0.6  # Current of the computer.
 _CONE: Final = np.radians((-7.0, 0.0, 7.0))  # An HC-SR04 hears 15 degrees.
-_HEARD_M: Final = 10.0  # More than twice as far as it hears; rays to walls beyond would cost time.
+_HEARD_M: Final = 10.0  # Longest ray, more than twice the range of an HC-SR04.
 
 _SOLID: Final = (np.arange(mujoco.mjNGROUP) == SOLID_GROUP).astype(np.uint8)
 _COARSE_DT: Final = 2.0 * SIM_DT
 _ROUNDING_S: Final = 1e-9
-# Laying out a course takes 70 ms and planning a path 60, so both are kept; a model takes 5 MB.
+# Number of cached courses: to lay out one takes 70 ms, to plan its path 60; a model has 5 MB.
 _KEPT_COURSES: Final = 64
 # Views from outside are a little above, at a height on the vehicle, m. At MuJoCo's field of view of
 # 45 degrees a sphere of radius 1 fills the height at a distance of 2.6.
 _ABOVE_RAD: Final = math.radians(-20.0)
 _LOOKED_AT_M: Final = 0.06
 _DISTANCE_PER_REACH: Final = 3.0
-# Farthest distance between two updates of the progress, m: well below that of `CourseProgress`.
+# Farthest distance between two updates of the progress, m: below the limit of `CourseProgress`.
 _PROGRESS_M: Final = 0.5
 
 
@@ -66,21 +66,6 @@ class MujocoWorld:
         lenses: Names of camera faults; see `shapechanger.vehicles.cameras.camera`.
         coarse: Whether to double the time step, except for a vehicle that turns on the spot, and
             to ignore contacts of wheels with walls. The wider hull still touches walls.
-
-    Attributes:
-        vehicle: Model of the vehicle.
-        mount: Pose and field of view of the camera.
-        course: The course.
-        look: Light and colours.
-        lenses: Names of camera faults.
-        model: Compiled MuJoCo model.
-        data: State of the simulation.
-        placed: Number of times that the vehicle was put at a start or back on its path.
-        travelled_m: Distance that the wheels rolled, m; backward counts down.
-
-    Raises:
-        UnknownName: If the vehicle, the world or a lens is unknown.
-        WorldError: If the vehicle does not fit the world.
     """
 
     def __init__(
@@ -108,13 +93,13 @@ class MujocoWorld:
         self.lenses = tuple(lenses)
         self._distortions: list[Corruption] = []
         if size is not None or lenses:
-            # Cameras are only loaded for images.
+            # Imported here, because cameras load OpenGL.
             from shapechanger.vehicles.cameras.camera import OnboardCamera, find_corruption
 
             self._camera = None if size is None else OnboardCamera(size, _CAMERA)
             self._distortions = [find_corruption(name) for name in lenses]
-        self.travelled_m = 0.0
-        self.placed = 0
+        self.travelled_m = 0.0  # Distance that the wheels rolled; backward counts down.
+        self.placed = 0  # Number of times that the vehicle was put at a start or on its path.
         self.lay_out(seed)
 
     @property
@@ -150,16 +135,10 @@ class MujocoWorld:
     def lay_out(
         self, seed: int, look: Look | None = None, camera: CameraJitter | None = None
     ) -> None:
-        """Change the course, light and colours, and put the vehicle at a start.
+        """Change the course, and put the vehicle at a start; by default light and colours are kept.
 
-        Args:
-            seed: Seed of the course and the start.
-            look: New light and colours; None to keep them.
-            camera: Error of the camera's pose; None for no error.
-
-        Raises:
-            WorldError: If the seed has no course, or the camera would be off its vehicle. The world
-                is unchanged then.
+        Raises a WorldError, and changes nothing, if the seed has no course or the camera would be
+        off its vehicle.
         """
         look = self.look if look is None else look
         require_element(self.vehicle.name, floats=self.vehicle.floats, world=self._world)
@@ -214,8 +193,7 @@ class MujocoWorld:
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
         """Simulate for a time, in whole steps; see `World.advance`.
 
-        The voltage of the battery and the contacts are updated once, so call it every 10 ms where
-        these matter.
+        Contacts and the voltage of the battery are updated once per call.
         """
         self._rest_s += dt_s
         steps = int((self._rest_s + _ROUNDING_S) / self._step_s)
@@ -263,10 +241,8 @@ class MujocoWorld:
     ) -> NDArray[np.float64]:
         """Distances from the middle of the front bumper to walls and obstacles, m, (n,).
 
-        Args:
-            bearings: Directions from the heading, rad, positive to the left, (n,); each from -pi/2
-                to pi/2, where the vehicle itself is not in the way.
-            farthest_m: Distance to report if nothing is nearer, m.
+        Bearings are directions from the heading, rad, positive to the left, each from -pi/2 to
+        pi/2. Distances are at most `farthest_m`.
         """
         found = self._rays(self.vehicle.nose_m, bearings, farthest_m, farthest_m)
         return np.minimum(found, farthest_m, out=found)
@@ -314,21 +290,18 @@ class MujocoWorld:
     ) -> NDArray[np.uint8]:
         """Image of the vehicle in its world from outside, (height, width, 3).
 
-        Args:
-            width: Width in pixels.
-            height: Height in pixels.
-            reach: Radius in view around the middle of the vehicle, m; None for its own reach.
-            azimuth_rad: Direction of view from the heading, counter-clockwise; 0 is from behind.
-                From several directions, the first in which no wall hides the vehicle is used.
-            elevation_rad: Angle of view above the horizon; negative looks down.
+        `reach` is the radius in view around the middle of the vehicle, m, by default its own reach.
+        The azimuth is the direction of view from the heading, counter-clockwise; 0 is from behind.
+        Of several directions, the first in which no wall hides the vehicle is used. A negative
+        elevation looks down.
         """
         if self._outside is None or self._outside.size != (width, height):
             from shapechanger.vehicles.cameras.camera import OutsideCamera  # OpenGL.
 
-            camera, before = OutsideCamera((width, height)), self._outside
+            camera = OutsideCamera((width, height))
+            if self._outside is not None:
+                self._outside.close()
             self._outside = camera
-            if before is not None:
-                before.close()
         x, y, heading = self._motion[:3]
         ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
         middle = self.vehicle.nose_m - 0.5 * self.vehicle.length_m

@@ -104,7 +104,7 @@ def test_a_drive_becomes_a_policy_of_waypoints(
     assert "looks 0 degrees down with a vertical field of view of 48.8" in printed
     assert "turns 1.90 rad for each metre and 0.00 for each second" in printed
     assert "fitted to the recorded motion" in printed
-    assert "16.7% of the steps are left out: it stands still" in printed
+    assert "16.7% of the steps are left out: the vehicle stands still" in printed
     assert "outside the image, which ends 31 degrees to each side" in printed
     DemosEvaluate(out, data).run()
     printed = " ".join(capsys.readouterr().out.split())

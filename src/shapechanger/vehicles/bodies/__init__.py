@@ -14,8 +14,7 @@ import msgspec
 import mujoco
 
 from shapechanger.errors import ProfileError, UnknownName
-from shapechanger.vehicles.bodies.boat import Floating
-from shapechanger.vehicles.bodies.model import BoundVehicle, Rolling
+from shapechanger.vehicles.bodies.model import BoundVehicle, Floating, Rolling
 from shapechanger.vehicles.bodies.parts import (
     HOBBY_MOTOR,
     CameraMount,
@@ -33,37 +32,22 @@ _FOLDER: Final = Path(__file__).parent
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleModel:
-    """A kind of vehicle.
-
-    Attributes:
-        name: Name, such as "car".
-        drives: Alternative sets of parts that drive and steer; a robot has exactly one set.
-        optional_parts: Further parts that a robot may have; they have no effect in simulation.
-        length_m: Length from bumper to bumper, including a trailer.
-        width_m: Largest width.
-        nose_m: Distance from the origin to the front bumper.
-        floats: Whether it moves on water.
-        camera: Mount of its camera.
-        top_speed_mps: Speed at full throttle and `BATTERY_V`, on level ground or in still water.
-        turning_radius_m: Radius of the origin's path at full lock; 0 if it turns on the spot.
-        gear: Turns of `HOBBY_MOTOR` for each turn of the shaft that it drives.
-        efficiency: Share of the torque that the gear passes on.
-        lock_deg: Angle at full steering of the rudder, or of a wheel in the middle of the front
-            axle, degrees; 0 for a vehicle that has neither.
-    """
+    """A kind of vehicle."""
 
     name: str
-    drives: tuple[frozenset[str], ...]
-    optional_parts: frozenset[str] = frozenset()
-    length_m: float
-    width_m: float
-    nose_m: float
+    drives: tuple[frozenset[str], ...]  # Sets of driving parts; a robot has exactly one set.
+    optional_parts: frozenset[str] = frozenset()  # Other parts; they are not simulated.
+    length_m: float  # Length from bumper to bumper, including a trailer.
+    width_m: float  # Largest width.
+    nose_m: float  # Distance from the origin to the front bumper.
     floats: bool = False
     camera: CameraMount
-    top_speed_mps: float
-    turning_radius_m: float
-    gear: float
-    efficiency: float = 1.0
+    top_speed_mps: float  # Speed at full throttle and `BATTERY_V`, on level ground or still water.
+    turning_radius_m: float  # Radius of the origin's path at full lock; 0 if it turns on the spot.
+    gear: float  # Turns of `HOBBY_MOTOR` for each turn of the shaft that it drives.
+    efficiency: float = 1.0  # Share of the torque that the gear transmits.
+    # Angle at full steering of the rudder, or of a wheel in the middle of the front axle; 0 for a
+    # vehicle without steering joints.
     lock_deg: float = 0.0
 
     @property

@@ -18,21 +18,13 @@ https://www.raspberrypi.com/documentation/accessories/camera.html."""
 
 @dataclass(frozen=True, slots=True)
 class CameraMount:
-    """Pose and field of view of a vehicle's camera.
+    """Pose and field of view of a vehicle's camera."""
 
-    Attributes:
-        x: Position ahead of the vehicle's origin, m.
-        z: Height above the ground, m.
-        y: Position to the left of the origin, m.
-        pitch_rad: Angle of the optical axis below the horizon.
-        fovy_deg: Vertical field of view.
-    """
-
-    x: float
-    z: float
-    y: float = 0.0
-    pitch_rad: float = 0.0
-    fovy_deg: float = PI_CAMERA_FOVY_DEG
+    x: float  # Position ahead of the vehicle's origin, m.
+    z: float  # Height above the ground, m.
+    y: float = 0.0  # Position to the left of the origin, m.
+    pitch_rad: float = 0.0  # Angle of the optical axis below the horizon.
+    fovy_deg: float = PI_CAMERA_FOVY_DEG  # Vertical field of view.
 
     def aimed(self, pitch_deg: float | None, fovy_deg: float | None) -> CameraMount:
         """Return the mount with the pitch and the field of view, degrees, that a profile states."""
@@ -61,21 +53,13 @@ _LOWEST_M, _FARTHEST_M = 0.01, 1.0
 
 @dataclass(frozen=True, slots=True)
 class CameraJitter:
-    """Error of a camera's pose.
-
-    Attributes:
-        up_m: Offset upwards, m.
-        left_m: Offset to the left, m.
-        roll_rad: Rotation about the line of sight; positive to the right.
-        pitch_rad: Rotation in pitch, positive down.
-        yaw_rad: Rotation in yaw, positive to the left.
-    """
+    """Error of a camera's pose."""
 
     up_m: float = 0.0
     left_m: float = 0.0
-    roll_rad: float = 0.0
-    pitch_rad: float = 0.0
-    yaw_rad: float = 0.0
+    roll_rad: float = 0.0  # Rotation about the line of sight; positive to the right.
+    pitch_rad: float = 0.0  # Positive down.
+    yaw_rad: float = 0.0  # Positive to the left.
 
     @staticmethod
     def random(rng: np.random.Generator) -> CameraJitter:
@@ -118,22 +102,14 @@ _RPM: Final = 2.0 * math.pi / 60.0  # rad/s
 class DcMotor:
     """A brushed DC motor with a gear; speeds and torques are at the output shaft.
 
-    voltage = resistance * current + volts_per_speed * speed. `torque_per_current` includes losses
-    of the gear. `free_a` includes dry friction, which causes the dead band.
-
-    Attributes:
-        resistance: Resistance of the winding, Ohm.
-        volts_per_speed: Back EMF, V·s/rad.
-        torque_per_current: Stall torque per current, N·m/A.
-        free_a: Current without load, A.
-        rotor_inertia: Inertia at the output shaft, kg·m2.
+    voltage = resistance * current + volts_per_speed * speed.
     """
 
-    resistance: float
-    volts_per_speed: float
-    torque_per_current: float
-    free_a: float
-    rotor_inertia: float
+    resistance: float  # Resistance of the winding, Ohm.
+    volts_per_speed: float  # Back EMF, V·s/rad.
+    torque_per_current: float  # Stall torque per current, with losses of the gear, N·m/A.
+    free_a: float  # Current without load, A; it includes dry friction, which causes the dead band.
+    rotor_inertia: float  # Inertia at the output shaft, kg·m2.
 
     @property
     def friction(self) -> float:
@@ -188,7 +164,7 @@ HOBBY_MOTOR: Final = DcMotor(
     # An estimate: the inertia of a rotor of 20 g and 8 mm radius, times the squared gear ratio.
     rotor_inertia=0.5 * 0.020 * 0.008**2 * 4.4**2,
 )
-"""Motor of all vehicles here, each with a further gear stage."""
+"""Motor of all vehicles, each with a further gear stage."""
 
 # Hitec HS-311 at 4.8 V, by its data sheet: 3.0 kgf·cm, 60 degrees in 0.19 s. The smallest angle
 # error at which it gives its full torque is an estimate; cheap servos hold to a few degrees.

@@ -24,7 +24,7 @@ OUTSIDE_VIEW: Final = 2
 
 
 Solids = tuple[Faces, NDArray[np.float64]]
-"""Faces, and the texture coordinates of their corners: (n, 4, 2 or 3), or an empty array."""
+"""Faces, and the texture coordinates of their corners, (n, 4, 2 or 3), or an empty array."""
 
 
 @functools.cache
@@ -129,7 +129,7 @@ def _add_shape(
 ) -> None:
     """Add a geom without mass or collisions, and its mesh unless there is one of that name.
 
-    `brightness` of each face is 0 to 1, (n,). None is for shapes that may roll.
+    `brightness` of each face is 0 to 1, (n,); None for shapes that emit their light.
     """
     if spec.mesh(name) is None:
         triangles = faces[:, [[0, 1, 2], [0, 2, 3]]]

@@ -35,7 +35,7 @@ _LARGEST: Final = 4096  # Width and height; software renderers draw no larger im
 
 
 class _Renderer:
-    """Renders views of models; an image of another model than the last loads its textures.
+    """Renders views of models; the first image of another model loads its textures.
 
     The OpenGL context is opened for the first image. A process that has only built a camera, such
     as the parent of an `AsyncVectorEnv`, can therefore be forked.
@@ -109,12 +109,7 @@ class _Renderer:
 
 
 class OnboardCamera(_Renderer):
-    """Renders the view of a model's camera, without the geoms of outside views.
-
-    Args:
-        size: Width and height in pixels.
-        name: Name of the camera.
-    """
+    """Renders the view of a model's camera by its name, without the geoms of outside views."""
 
     def __init__(self, size: tuple[int, int], name: str) -> None:
         super().__init__(size, OUTSIDE_VIEW)
@@ -149,15 +144,10 @@ class OutsideCamera(_Renderer):
         azimuth_rad: float,
         elevation_rad: float,
     ) -> NDArray[np.uint8]:
-        """Render a state.
+        """Render a state from a distance to the point in the middle of the image, m, (3,).
 
-        Args:
-            model: Compiled model.
-            data: State of the model.
-            middle: Point in the middle of the image, m, (3,).
-            distance_m: Distance of the camera from `middle`.
-            azimuth_rad: Direction of view seen from above, from the x axis, counter-clockwise.
-            elevation_rad: Angle of view above the horizon; negative looks down.
+        The azimuth is the direction of view from the x axis, counter-clockwise seen from above. The
+        elevation is the angle of view above the horizon; negative looks down.
         """
         self._camera.lookat[:] = middle
         self._camera.distance = distance_m
@@ -177,9 +167,7 @@ Corruption = Callable[[Picture, int], Picture]
 # shadows. At a quarter of these factors, which imitates no gain, a person saw nothing.
 _NIGHT_SHARE: Final = (0.46, 0.5, 0.66)
 _NIGHT_GAMMA: Final = 1.1
-_NIGHT_NOISE: Final = (
-    9.0  # Standard deviation of a small sensor's noise at the highest gain, of 255.
-)
+_NIGHT_NOISE: Final = 9.0  # Standard deviation of a sensor's noise at the highest gain, of 255.
 # Levels, of 255, that glare adds in its middle, and that it adds everywhere as a veil.
 _GLARE_PEAK, _GLARE_VEIL = 230.0, 28.0
 _BLUR: Final = 0.0125  # Standard deviation, as a share of the width: 2 of 160 pixels.
@@ -275,7 +263,7 @@ def _glare(seed: int, height: int, width: int) -> NDArray[np.float32]:
     away = np.hypot(columns - x, rows - y) / width
     spot = np.exp(-((away / rng.uniform(0.09, 0.16)) ** 2))
     halo = np.exp(-away / 0.3)
-    # A horizontal streak, as from a smeared or cheap lens.
+    # Smeared and cheap lenses cause a horizontal streak.
     streak = np.exp(-(((rows - y) / (0.015 * width)) ** 2)) * halo
     light = _GLARE_PEAK * np.minimum(1.0, spot + 0.45 * halo + 0.3 * streak) + _GLARE_VEIL
     return (light[..., None] * np.array([1.0, 0.97, 0.86])).astype(np.float32)

@@ -30,7 +30,7 @@ HALF_WIDTH_RAD: Final = math.atan(0.5 * CANONICAL_SIZE[0] / _FOCAL)
 
 _SAMPLES: Final = 3  # Samples of a pixel in each direction.
 _NEAREST: Final = 1e-3  # Depth of a ray below which it points sideways or behind the camera.
-_MOST_MISSING: Final = 0.15  # Largest share of the view's pixels that a camera may miss.
+_MOST_MISSING: Final = 0.15  # Largest share of the virtual camera's pixels without an image.
 
 # Vertical fields of view at which the search for the camera's field of view starts, degrees.
 _FIRST_FOVY_DEG: Final = (30.0, 48.0, 70.0, 100.0)
@@ -65,17 +65,11 @@ class CameraGeometry:
 
 
 class Rectifier:
-    """Warps images of one camera to the virtual camera.
+    """Warps images of one camera, of a width and height in pixels, to the virtual camera.
 
     Each pixel of the virtual camera is a ray, which is turned by the pitch to find the pixel of the
-    real camera. Differences in the height of cameras are not corrected.
-
-    Args:
-        geometry: The real camera.
-        size: Width and height of the real camera's images, pixels.
-
-    Raises:
-        WorldError: If the camera does not cover the view of the virtual camera.
+    real camera. Differences in the height of cameras are not corrected. A WorldError is raised if
+    the camera does not cover the view of the virtual camera.
     """
 
     def __init__(self, geometry: CameraGeometry, size: tuple[int, int]) -> None:
@@ -101,10 +95,9 @@ class Rectifier:
         self._shape = (high, wide, 3)
 
     def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return an image, (height, width, 3), as the virtual camera would have taken it.
+        """Warp an image, (height, width, 3), to the shape (48, 80, 3).
 
-        The result has the shape (48, 80, 3). Pixels outside the real camera's view repeat the
-        nearest pixel inside it.
+        Pixels outside the real camera's view repeat the nearest pixel inside it.
         """
         if picture.shape != self._shape:
             raise WorldError(
@@ -119,14 +112,7 @@ class Rectifier:
 
 
 class CanonicalView:
-    """Warps images to the virtual camera of all vehicles.
-
-    Args:
-        camera: The camera that took the images; None for the camera that each episode states.
-
-    Attributes:
-        rectifiers: Rectifiers used so far, keyed by the camera and the size of its images.
-    """
+    """Warps images to the virtual camera, by default from the camera that each episode states."""
 
     def __init__(self, camera: CameraGeometry | None = None) -> None:
         self._camera = camera
@@ -134,13 +120,9 @@ class CanonicalView:
         self._bodies: set[str] = set()
 
     def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
-        """Return an image of an episode as the virtual camera would have taken it.
+        """Warp an image of an episode; images of episodes with waypoints are warped already.
 
-        Images of episodes whose actions are waypoints are returned unchanged.
-
-        Raises:
-            DemosError: If the camera is unknown, or the episodes are of several bodies.
-            WorldError: If the camera is invalid or does not cover the virtual camera's view.
+        Raises a DemosError if the camera is unknown, or the episodes are of several bodies.
         """
         self._bodies.add(header.body)
         if len(self._bodies) > 1:
@@ -175,30 +157,19 @@ class CanonicalView:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredCamera:
-    """A camera's geometry from an image of a checkerboard.
-
-    Attributes:
-        geometry: The geometry.
-        roll_deg: Turn of the camera about its optical axis, degrees, clockwise as it looks.
-        pitch_sd_deg: Standard deviation of the pitch, degrees.
-        fovy_sd_deg: Standard deviation of the field of view, degrees; 0 if the field was given.
-        error_px: Root mean square distance of the corners from where they should be, pixels.
-    """
+    """A camera's geometry from an image of a checkerboard, with standard deviations."""
 
     geometry: CameraGeometry
-    roll_deg: float
+    roll_deg: float  # Turn about the optical axis, clockwise in the direction of view.
     pitch_sd_deg: float
-    fovy_sd_deg: float
-    error_px: float
+    fovy_sd_deg: float  # 0 if the field of view was given.
+    error_px: float  # Root mean square distance of detected from fitted corners, pixels.
 
 
 def pitch_of_horizon(row: float, height: int, fovy_deg: float) -> float:
     """Return the angle of the optical axis below the horizon, degrees.
 
-    Args:
-        row: Row of the horizon, pixels from the top.
-        height: Height of the image, pixels.
-        fovy_deg: Vertical field of view, degrees.
+    `row` is the row of the horizon from the top of an image of this height, pixels.
     """
     if not 0.0 <= row <= height:
         raise WorldError(f"The horizon must be in a row from 0 to {height}, got {row:g}.")
@@ -211,19 +182,11 @@ def measure_camera(
 ) -> MeasuredCamera:
     """Measure a camera's geometry from one image of a checkerboard that stands upright.
 
-    OpenCV finds the corners, and fits focal length and pose of a camera without distortion, with
-    square pixels and its axis in the middle.
-
-    Args:
-        picture: Shape (height, width, 3), of the camera's whole field of view. Without `fovy_deg`
-            the board must be turned by some 30 to 45 degrees: seen straight on, a near board in a
-            wide field of view looks like a far board in a narrow one.
-        corners: Inner corners of the board along its two sides, each at least 3.
-        fovy_deg: Vertical field of view, degrees; None to measure it.
-
-    Raises:
-        MissingExtra: If OpenCV is not installed.
-        WorldError: If there is no such board in the image, or it does not determine the geometry.
+    OpenCV finds the inner `corners` along the two sides of the board, and fits focal length and
+    pose of a camera without distortion, with square pixels and its axis in the middle. `picture`,
+    (height, width, 3), has the camera's whole field of view. Without `fovy_deg`, degrees, the board
+    must be turned by some 30 to 45 degrees: seen straight on, a near board in a wide field of view
+    looks like a far board in a narrow one. Raises a WorldError if the geometry is not determined.
     """
     try:
         import cv2
@@ -288,11 +251,9 @@ def measure_camera(
 
 
 def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
-    """Draw the horizon and the edge of the virtual camera's view, in yellow, on a copy of an image.
+    """Draw the horizon and the edge of the virtual camera's view on a copy of an image, (h, w, 3).
 
-    Args:
-        picture: Image, shape (height, width, 3).
-        geometry: The camera that took the image.
+    Both lines are yellow; the horizon is dotted.
     """
     height, width = picture.shape[:2]
     Rectifier(geometry, (width, height))
@@ -300,7 +261,6 @@ def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[n
     along, none = np.linspace(0.0, 1.0, 2 * (width + height)), np.zeros(2 * (width + height))
     edges = ((along, none), (along, none + 1.0), (none, along), (none + 1.0, along))
     lines = [(columns * x, rows * y) for x, y in edges]
-    # The horizon is a dotted line.
     lines.append((columns * along[::8], none[::8] + _HORIZON))
     drawn = picture.copy()
     for x, y in lines:

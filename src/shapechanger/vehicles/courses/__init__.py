@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName, WorldError
-from shapechanger.vehicles.courses.channel import open_course
-from shapechanger.vehicles.courses.corridor import corridor
 from shapechanger.vehicles.courses.course import FLOODED, Course
 from shapechanger.vehicles.courses.geometry import distances_from_obstacle, turn_angles
+from shapechanger.vehicles.courses.layouts import corridor, open_course
 
 WORLDS: Final = ("corridor", "yard", "harbour", FLOODED)
 """Kinds of course."""
@@ -23,12 +22,7 @@ _ATTEMPTS: Final = 500
 
 
 def lay_out(world: str, seed: int) -> Course:
-    """Lay out the course of a seed; a seed gives the same course on every machine.
-
-    Args:
-        world: One of `WORLDS`.
-        seed: Seed, >= 0; see `TRAINING` and `HELD_OUT` in `shapechanger.vehicles.courses.course`.
-    """
+    """Lay out the course of a seed, >= 0, in one of `WORLDS`; it is the same on every machine."""
     if world == FLOODED:
         return dataclasses.replace(lay_out("corridor", seed), world=world)
     if world not in WORLDS:
@@ -63,7 +57,7 @@ def start_pose(course: Course, seed: int) -> Pose:
     behind, before = (round(reach / course.spacing) for reach in (_BEHIND_M, _AHEAD_M))
     bend = _sums(turn_angles(route), behind, 0)
     places = np.flatnonzero((_sums(~free, behind, before) < 0.5) & (np.abs(bend) < _STRAIGHT_RAD))
-    # If there is no free point, take the first point of the route, which obstacles keep away from.
+    # If no point is free, take the first point of the route, where no obstacles are placed.
     i = int(places[int(np.random.default_rng(seed).integers(len(places)))]) if len(places) else 0
     dx, dy = ahead[i] - route[i - 1]
     return Pose(float(route[i, 0]), float(route[i, 1]), float(np.arctan2(dy, dx)))
@@ -72,7 +66,7 @@ def start_pose(course: Course, seed: int) -> Pose:
 def _sums(
     values: NDArray[np.float64] | NDArray[np.bool_], behind: int, before: int
 ) -> NDArray[np.float64]:
-    """Sums along a closed line, from `behind` values behind to `before` ahead."""
+    """For each point of a closed line, sum its value, `behind` earlier and `before` later ones."""
     whole = np.concatenate([values[-behind:], values, values[:before]])
     sums = np.concatenate([[0.0], np.cumsum(whole)])
     window = behind + before + 1

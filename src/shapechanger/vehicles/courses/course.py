@@ -44,17 +44,11 @@ class Wall:
     """An upright rectangle.
 
     Seen from `start` towards `end`, the lane is on the left; only that side is ever visible.
-
-    Attributes:
-        start: x and y of the start, m.
-        end: x and y of the end, m.
-        height: Height above the ground, m.
-        surface: Material.
     """
 
-    start: tuple[float, float]
-    end: tuple[float, float]
-    height: float
+    start: tuple[float, float]  # x and y, m.
+    end: tuple[float, float]  # x and y, m.
+    height: float  # Height above the ground, m.
     surface: Surface
 
     @staticmethod
@@ -79,25 +73,15 @@ class Wall:
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """An upright box or cylinder in the lane.
-
-    Attributes:
-        kind: Kind, which also decides whether the obstacle is a box or a cylinder.
-        x: Position of the middle, m.
-        y: Position of the middle, m.
-        yaw: Angle of the length from the x axis, rad, counter-clockwise.
-        length: Length, or diameter of a cylinder, m.
-        width: Width, or diameter of a cylinder, m.
-        height: Height above the ground, m.
-    """
+    """An upright box or cylinder in the lane."""
 
     kind: ObstacleKind
-    x: float
+    x: float  # Position of the middle, m.
     y: float
-    yaw: float
-    length: float
-    width: float
-    height: float
+    yaw: float  # Angle of the length from the x axis, rad, counter-clockwise.
+    length: float  # Length, or diameter of a cylinder, m.
+    width: float  # Width, or diameter of a cylinder, m.
+    height: float  # Height above the ground, m.
 
     @property
     def is_round(self) -> bool:
@@ -107,51 +91,31 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class Lamp:
-    """A rectangular light under the ceiling, or a patch of sun on the ground.
+    """A rectangular light under the ceiling, or a patch of sun on the ground."""
 
-    Attributes:
-        x: Position of the middle, m.
-        y: Position of the middle, m.
-        yaw: Angle of the length from the x axis, rad.
-        length: Length, m.
-        width: Width, m.
-    """
-
-    x: float
+    x: float  # Position of the middle, m.
     y: float
-    yaw: float
-    length: float
-    width: float
+    yaw: float  # Angle of the length from the x axis, rad.
+    length: float  # m.
+    width: float  # m.
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A closed lane between walls, with obstacles in it.
+    """A closed lane between walls, with obstacles in it; world and seed determine it."""
 
-    Attributes:
-        world: Kind of course: "corridor", "yard", "harbour" or "flooded-corridor".
-        seed: Seed; world and seed determine the course.
-        route: Middle of the lane in driving direction, m, (N, 2): a closed line of points that are
-            `spacing` apart. The last point is one `spacing` before the first.
-        half_width: Distance from the route to the nearest wall, without obstacles, m, (N,).
-        walls: Walls on both sides.
-        obstacles: Obstacles in the lane; each leaves a gap of at least `gap_m`.
-        lamps: Lights.
-        ceiling_m: Height of the ceiling; 0 under the open sky.
-        gap_m: Width of the narrowest passage between obstacles and walls, m.
-        current_mps: Flow of the water, x and y, m/s; 0 on land.
-    """
-
-    world: str
+    world: str  # Kind of course: "corridor", "yard", "harbour" or "flooded-corridor".
     seed: int
+    # Middle of the lane in driving direction, m, (N, 2): a closed line of points that are `spacing`
+    # apart. The last point is one `spacing` before the first.
     route: NDArray[np.float64]
-    half_width: NDArray[np.float64]
+    half_width: NDArray[np.float64]  # Distance from the route to the nearest wall, m, (N,).
     walls: tuple[Wall, ...]
     obstacles: tuple[Obstacle, ...]
     lamps: tuple[Lamp, ...]
-    ceiling_m: float
-    gap_m: float
-    current_mps: tuple[float, float] = (0.0, 0.0)
+    ceiling_m: float  # Height of the ceiling; 0 under the open sky.
+    gap_m: float  # Width of the narrowest passage between obstacles and walls.
+    current_mps: tuple[float, float] = (0.0, 0.0)  # Flow of the water, x and y.
 
     @property
     def spacing(self) -> float:
@@ -172,31 +136,21 @@ Colour = tuple[float, float, float]
 VARIANTS: Final = 12
 """Number of texture sets that random looks use, small enough to cache all sets."""
 
-# Red, green and blue of the light at a `warmth` of 1. For comparison, the mean colour of images of
-# a car's camera in a lit corridor at night was 76, 67, 14.
+# Red, green and blue of the light at a `warmth` of 1. The mean colour of images that a car's camera
+# took in a lit corridor at night was 76, 67, 14.
 _WARM: Final = np.array([1.0, 0.92, 0.2])
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Light and colours of a course.
+    """Light and colours of a course."""
 
-    Attributes:
-        light: Brightness, from 0 (black) to 1 (daylight, or all lamps on).
-        warmth: Colour of the light, from 0 (white) to 1 (the yellow-green of old lamps).
-        contrast: From 0 (the same light everywhere) to 1 (dark between the lamps).
-        gloss: Reflectance of the ground or the water, 0 to 0.9.
-        wall: Factors on red, green and blue of the walls.
-        ground: Factors on red, green and blue of the ground.
-        texture_seed: Seed of the textures, >= 0.
-    """
-
-    light: float = 0.8
-    warmth: float = 0.3
-    contrast: float = 0.5
-    gloss: float = 0.3
-    wall: Colour = (1.0, 1.0, 1.0)
-    ground: Colour = (1.0, 1.0, 1.0)
+    light: float = 0.8  # Brightness, from 0 (black) to 1 (daylight, or all lamps on).
+    warmth: float = 0.3  # Colour of the light, from 0 (white) to 1 (yellow-green of old lamps).
+    contrast: float = 0.5  # From 0 (the same light everywhere) to 1 (dark between the lamps).
+    gloss: float = 0.3  # Reflectance of the ground or the water, 0 to 0.9.
+    wall: Colour = (1.0, 1.0, 1.0)  # Factors on the colours of the walls.
+    ground: Colour = (1.0, 1.0, 1.0)  # Factors on the colour of the ground.
     texture_seed: int = 0
 
     @staticmethod

@@ -62,19 +62,8 @@ class LaneObstacles:
     """Obstacles in a lane; an obstacle that would block the lane or a door is rejected.
 
     Vehicles pass an obstacle on its wider side. Two obstacles that are passed on the same side may
-    stand close together; two that are passed on different sides are a gap apart.
-
-    Args:
-        route: Middle of the lane, as in `Course`, m, (n, 2).
-        left: Walls on the left of the lane.
-        right: Walls on the right of the lane.
-        gap_m: Smallest gap that must remain, m.
-
-    Attributes:
-        route: Middle of the lane.
-        half_width: Distance of each point of the route from the nearest wall, m, (n,).
-        obstacles: Obstacles that were not rejected.
-        gap_m: Narrowest remaining passage, m.
+    be close together; two that are passed on different sides are at least `gap_m` apart.
+    `route` and `half_width` are as in `Course`.
     """
 
     def __init__(
@@ -84,7 +73,7 @@ class LaneObstacles:
         self._walls = wall_segments((*left, *right))
         self._doors = np.array([wall.surface == "door" for wall in (*left, *right)])
         self.half_width = distances_to_segments(route, self._walls).min(axis=1)
-        self.gap_m = 2.0 * float(self.half_width.min())
+        self.gap_m = 2.0 * float(self.half_width.min())  # Narrowest remaining passage.
         self._round_m = length(route)
         self.obstacles: list[Obstacle] = []
         self._passed_left: list[bool] = []

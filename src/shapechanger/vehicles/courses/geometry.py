@@ -170,7 +170,7 @@ def any_crossing(pieces: Segments) -> bool:
     start, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
 
     def side(points: Array) -> Array:
-        """Matrix of segments (rows) and points (columns): positive if the point is to the left."""
+        """Return, for each segment (row) and point (column), > 0 if the point is to the left."""
         x, y = points[:, 0] - start[:, :1], points[:, 1] - start[:, 1:]
         hand = along[:, :1] * y - along[:, 1:] * x
         return np.where(np.abs(hand) < 1e-9, 0.0, hand)
@@ -239,7 +239,7 @@ def _into(obstacle: Obstacle, points: Array) -> Array:
 
 
 FAR_M: Final = 2.5
-"""Largest distance that is reported, m; larger distances are reported as this one."""
+"""Upper limit of reported distances, m."""
 
 _CHUNK: Final = 256
 
@@ -256,8 +256,8 @@ class ClearanceField:
     def distance(self, points: Array) -> Array:
         """Distance of each point, m, (N, 2), from the nearest wall or obstacle, m, (N,).
 
-        The distance is at most `FAR_M`, and 0 inside an obstacle. The computation is fast if
-        neighbours in the array are close to each other.
+        The distance is at most `FAR_M`, and 0 inside an obstacle. The computation is faster if
+        successive points are close to each other.
         """
         parts = [self._near(points[i : i + _CHUNK]) for i in range(0, len(points), _CHUNK)]
         return np.concatenate([np.empty(0), *parts])
@@ -274,40 +274,27 @@ class ClearanceField:
         return np.maximum(found, 0.0)
 
 
-# Distance along the line, m, within which the nearest spot is searched around a hint. Neighbouring
-# parts of a course are much farther apart along the line, so they are not confused.
+# Distance along the line, m, within which the nearest spot is searched around a hint. Two parts of
+# a course that are side by side are much farther apart along the line.
 _WINDOW_M: Final = 2.0
 
 
 class Spot(NamedTuple):
-    """Position relative to a line.
+    """Position relative to a line."""
 
-    Attributes:
-        station: Distance along the line, m, from 0 to its length.
-        lateral: Distance from the line, m; positive to the left.
-    """
-
-    station: float
-    lateral: float
+    station: float  # Distance along the line, m, from 0 to its length.
+    lateral: float  # Distance from the line, m; positive to the left.
 
 
 class ClosedLine:
-    """Closed polyline; the last point is joined to the first.
-
-    Args:
-        points: Points, m, (N, 2); neighbours must differ.
-
-    Attributes:
-        points: The points.
-        stations: Distance of each point along the line, m, (N,).
-        length: Length of the line, m.
-    """
+    """Closed polyline of points, m, (N, 2); neighbours must differ."""
 
     def __init__(self, points: Array) -> None:
         self.points = points
         self._steps = np.roll(points, -1, axis=0) - points
         self._squared = np.einsum("ij,ij->i", self._steps, self._steps)
         lengths = np.sqrt(self._squared)
+        # Distance of each point along the line, m, (N,), and length of the line, m.
         self.stations: Array = np.concatenate(([0.0], np.cumsum(lengths)[:-1]))
         self.length = float(lengths.sum())
         self._window = int(np.ceil(_WINDOW_M / (self.length / len(points))))
@@ -332,7 +319,7 @@ class ClosedLine:
             first, count = 0, len(self.points)
         else:
             first, count = self.index(hint) - self._window, 2 * self._window + 1
-        # Each control step calls this function, so it makes few and small arrays.
+        # Each control step calls this function, so it uses few and small arrays.
         near = self._around[:, first + self._window : first + self._window + count]
         start_x, start_y, step_x, step_y, squared = near
         away_x, away_y = x - start_x, y - start_y
@@ -353,7 +340,7 @@ class ClosedLine:
 class CourseProgress:
     """Measures a vehicle's net distance along a route over all laps; driving back reduces it.
 
-    Call `reset` first, and after moving the vehicle by more than 2 m.
+    Call `reset` first, and whenever the vehicle moves by more than 2 m at once.
     """
 
     def __init__(self, course: Course) -> None:

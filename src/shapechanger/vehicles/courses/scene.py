@@ -24,8 +24,8 @@ SOLID_GROUP: Final = 3
 # moves in a step.
 _THICKNESS: Final = 0.06
 _WALL_FRICTION: Final = 0.3  # Friction of hulls on walls, an estimate.
-# Texture of the ground and its sliding friction. That of rubber on dry concrete is 0.6 to 0.85
-# (Engineering Toolbox, "Friction and Friction Coefficients"); yards are dusty.
+# Texture of the ground and its sliding friction. Rubber on dry concrete has a friction of 0.6 to
+# 0.85 (Engineering Toolbox, "Friction and Friction Coefficients"); yards are dusty.
 _GROUND: Final = {
     "corridor": ("floor", 0.85),
     "yard": ("asphalt", 0.75),
@@ -40,9 +40,8 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     """Add a course to a model, with element names that start with "world/".
 
     There is one visual mesh per material, with precomputed light, because shadows and MuJoCo's
-    reflections would take most of the time of a small image. The only light shines straight up,
-    and only these meshes have normals made for it; vehicles need emissive materials. A glossy
-    ground is a translucent sheet over a mirrored copy of the course.
+    reflections would take most of the time of a small image. The only light shines straight up
+    (see `add_lit_mesh`). A glossy ground is a translucent sheet over a mirrored copy of the course.
     """
     spec.visual.headlight.active = 0
     spec.visual.quality.shadowsize = spec.visual.quality.offsamples = 0
@@ -92,7 +91,7 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
         show("harbour", fittings(course), plain)
     show("things", surfaces.obstacles(), plain)
     if course.ceiling_m > 0.0:
-        # They stay bright in dim light, as they do for a camera.
+        # Lamps stay bright in dim light, as for a real camera.
         red, green, blue = (c ** (1.0 / 4.0) for c in plain)
         show("lamps", surfaces.lamps(), (red, green, blue), "things")
     # The ground is last, because it is blended over the mirrored course.

@@ -41,8 +41,8 @@ class QuadMesh:
     ) -> None:
         """Add n quads.
 
-        Corners are (n, 4, 3), m, texture coordinates (n, 4, 2), and lights, 0 to 1, (n, 4). What is
-        not `reflected` is hidden in a glossy ground.
+        Corners are (n, 4, 3), m, texture coordinates (n, 4, 2), and lights, 0 to 1, (n, 4). A
+        glossy ground mirrors only `reflected` quads.
         """
         lights = np.broadcast_to(lights, corners.shape[:2])
         self._quads.append((corners, uvs, lights, np.full(len(corners), reflected)))
@@ -125,7 +125,7 @@ _WHOLE: Final = {"door": 1.0, "window": 1.8, "board": 2.6, "glass": 1.4}
 _CLAD: Final = 0.2  # Share of the plastered walls with wooden panels.
 # Height of the brick texture, m, which repeats; the others are stretched to the wall.
 _BRICK_HEIGHT: Final = 1.8
-_DOOR_HEIGHT: Final = 2.1  # Of a door with its frame, m, below plaster.
+_DOOR_HEIGHT: Final = 2.1  # Height of a door with its frame, m; plaster is above it.
 # Longest patch of a wall, m: shorter than the distance between two lamps, over which light varies.
 _LONGEST: Final = 0.8
 # Relative heights at which a wall's light is computed, and its factor there.
@@ -313,12 +313,12 @@ BANK_M: Final = 0.4
 """Width of quays and rocks; two parts of the lane are at least twice this apart."""
 
 _PAVING_PERIOD: Final = 2.4
-# Probabilities that a quay wall of 2 m has them.
+# Probabilities of each fitting at a quay wall of 2 m.
 _BOLLARD, _TYRE, _LADDER = 0.55, 0.4, 0.12
 _MOST_BOATS: Final = 12
 _KINDS: Final = ("sail", "motor", "fishing")
-_BEAM: Final = 0.34  # Width of a boat over its length.
-_SPACE_M: Final = 0.15  # Between a moored boat and its quay.
+_BEAM: Final = 0.34  # Width of a boat divided by its length.
+_SPACE_M: Final = 0.15  # Distance between a moored boat and its quay.
 _SHORE_SIDES: Final = 72
 _HILL_M: Final = (2.0, 9.0)
 _HOUSES: Final = 26
@@ -331,7 +331,7 @@ def _rears(walls: tuple[Wall, ...]) -> list[tuple[Array, Array]]:
 
     def corner(point: tuple[float, float], wall: Wall, other: Wall) -> Array:
         back = wall.behind() + other.behind()
-        # Both walls' rear sides are as far back.
+        # The corner is `BANK_M` behind both walls.
         return np.asarray(point) + 2.0 * BANK_M * back / max(1.0, float(back @ back))
 
     return [

@@ -58,7 +58,7 @@ def _stretch(knots: Field, size: int) -> Field:
 
 _Range = tuple[float, float]
 _SIZE, _TALL = 256, 512
-_SKIRTING: Final = 0.05  # Height of a skirting board over the height of a wall, 2.4 m.
+_SKIRTING: Final = 0.05  # Height of a skirting board divided by the height of a wall, 2.4 m.
 _DARK: Final = (0.24, 0.22, 0.16)
 _FRAME: Final = (0.24, 0.22, 0.19)
 _STEEL: Final = (0.75, 0.75, 0.72)
@@ -148,9 +148,10 @@ def window(rng: np.random.Generator) -> Field:
 def _stones(
     rng: np.random.Generator, rows: int, columns: int, shades: _Range, joints: _Range
 ) -> tuple[Field, Field]:
-    """Brightness of stones in courses offset by half, in a range, and mask of joints.
+    """Brightness of stones, in the range `shades`, and mask of the joints between them.
 
-    `joints` are height and width over those of a stone.
+    Every other row is offset by half a stone. `joints` are height and width of the joints, as
+    shares of a stone's.
     """
     y = np.arange(_SIZE)[:, None] * rows / _SIZE
     x = np.arange(_SIZE)[None, :] * columns / _SIZE + 0.5 * (y.astype(int) % 2)

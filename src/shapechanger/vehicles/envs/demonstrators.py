@@ -29,7 +29,7 @@ Each was cloned from ten minutes of its expert's driving; `clones/README.md` is 
 """
 
 Driver = Callable[[], NDArray[np.float32]]
-"""A driver, whose calls return actions, (2,)."""
+"""A driver: a function that returns the next action, (2,)."""
 
 _WANDER_S: Final = 0.6  # Correlation time of the wandering.
 _JERKS_PER_S, _JERK_S = 0.25, (0.15, 0.5)  # Mean rate of jerks, and range of their duration.
@@ -42,14 +42,9 @@ class Demonstrator:
     The vehicle executes the disturbed action, and the driver's own is recorded (M. Laskey et al.,
     "DART: Noise Injection for Robust Imitation Learning", CoRL 2017). There are two kinds of noise:
     slow wandering (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion",
-    Physical Review 36, 1930) and rare jerks of the steering.
-
-    Args:
-        world: World of the vehicle.
-        begin: Called at the beginning of an episode; returns the driver.
-        seed: Seed of the mistakes.
-        sway: Standard deviation of the wandering of the steering; jerks steer by up to three times
-            as much. None for the standard deviation that the vehicle can correct.
+    Physical Review 36, 1930) and rare jerks of the steering. `begin` is called at the beginning of
+    an episode, and returns the driver. `sway` is the standard deviation of the wandering of the
+    steering; jerks are up to three times as large. By default it is what the vehicle can correct.
     """
 
     def __init__(

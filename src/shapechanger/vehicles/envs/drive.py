@@ -46,33 +46,19 @@ _MAX_PIXELS: Final = 1920  # Limit of a profile.
 
 
 class SimulatedRobot(msgspec.Struct, frozen=True):
-    """The part of a robot's profile that its simulation and recordings need.
+    """The part of a robot's profile that its simulation and recordings need."""
 
-    Attributes:
-        robot: Name of the robot.
-        body: Kind of vehicle.
-        path: File of the profile, for messages.
-        plan: Actions, outputs, sensors and limits.
-        control_hz: Actions per second.
-        reward: Weights of the task.
-        action_layout: Layout of the actions.
-        state_layout: Layout of the state.
-        size: Width and height of the camera's frames, pixels; (0, 0) without a camera.
-        camera_pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
-        camera_fovy_deg: Vertical field of view, degrees; None if unknown.
-    """
-
-    robot: str
-    body: str
-    path: str
+    robot: str  # Name of the profile.
+    body: str  # Kind of vehicle.
+    path: str  # File of the profile, for messages.
     plan: GuardPlan
-    control_hz: float
-    reward: dict[str, float]
+    control_hz: float  # Actions per second.
+    reward: dict[str, float]  # Weights of the task.
     action_layout: Layout
     state_layout: Layout
-    size: tuple[int, int]
-    camera_pitch_deg: float | None
-    camera_fovy_deg: float | None
+    size: tuple[int, int]  # Width and height of frames, pixels; (0, 0) without a camera.
+    camera_pitch_deg: float | None  # Angle of the camera's axis below the horizon, if known.
+    camera_fovy_deg: float | None  # Vertical field of view, if known.
 
 
 @functools.cache
@@ -92,18 +78,10 @@ def simulated_robot(
     size: Sequence[int] | None = None,
     steering: Steering | None = None,
 ) -> SimulatedRobot:
-    """Return the robot of a vehicle, and set its steering and its camera's frame size.
+    """Return the robot of a vehicle, checked against the driving task.
 
-    Args:
-        vehicle: Name of the vehicle.
-        robot: Path or name of its profile; None for `lab-` followed by the vehicle.
-        size: Width and height of frames, pixels; None for the profile's size.
-        steering: Steering that replaces the profile's; None for the profile's steering.
-
-    Raises:
-        UnknownName: If the name of the vehicle, profile or steering is unknown.
-        ProfileError: If the profile is for another vehicle, or has no camera.
-        SpaceMismatch: If the size is out of range.
+    `robot` is the path or name of its profile; None for `lab-` followed by the vehicle. `size`,
+    pixels, and `steering` replace the profile's.
     """
     vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
     named = f"lab-{vehicle}" if robot is None else os.fspath(robot)
@@ -133,7 +111,7 @@ def simulated_robot(
 
 
 Courses = Literal["training", "held-out"] | Sequence[int]
-"""Courses for training, held-out courses for evaluation, or courses by their seeds."""
+"""Courses for training, held-out courses for evaluation, or the seeds of courses."""
 
 _KINDS: Final = {"training": TRAINING, "held-out": HELD_OUT}
 _OPTIONS: Final = ("course", "start")
@@ -145,7 +123,7 @@ def _course_seeds(courses: Courses) -> Sequence[int]:
         if courses not in _KINDS:
             raise UnknownName("kind of courses", courses, _KINDS)
         return _KINDS[courses]
-    given: Any = courses  # May be a single seed where nothing checks types.
+    given: Any = courses  # May also be a single seed.
     seeds = tuple(_seed_of("course", seed) for seed in np.atleast_1d(np.array(given, object)))
     if not seeds:
         raise WorldError("There are no courses to draw from: give at least one seed.")
@@ -157,17 +135,12 @@ def _seed_of(kind: str, seed: Any) -> int:
 
 
 class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
-    """The driving task: a vehicle on sampled courses, within its robot's limits.
-
-    Attributes:
-        parts: The parts that the robot's outputs move, such as "wheels" and "steering".
-        world: The simulated world, with its ground truth.
-    """
+    """The driving task: a vehicle on sampled courses, within its robot's limits."""
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
-    parts: frozenset[str]
+    parts: frozenset[str]  # Parts that the robot's outputs move, such as "wheels".
     action_layout: Layout
-    world: MujocoWorld
+    world: MujocoWorld  # The simulated world, with its ground truth.
 
     def __new__(cls, *arguments: Any, **options: Any) -> Self:
         """Store the arguments for pickling."""
@@ -190,7 +163,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         lenses: Sequence[str] = (),
         render_mode: str | None = None,
     ) -> None:
-        """Open the world, and set what all views of it have; see their arguments."""
+        """Open the world; see `VehicleEnv` for the arguments."""
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise UnknownName("render mode", render_mode, self.metadata["render_modes"])
         self.render_mode, self._puts_back = render_mode, put_back
@@ -219,8 +192,8 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
         Args:
             seed: Seed of the sampling of courses, starts and looks.
-            options: `course`, the seed of a course, and `start`, the seed of a start on it; omitted
-                ones are sampled.
+            options: `course`, the seed of a course, and `start`, the seed of a start on it; an
+                omitted seed is sampled.
 
         Raises:
             UnknownName: If the name of an option is unknown.
@@ -233,7 +206,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             if name not in _OPTIONS:
                 raise UnknownName("option of reset", name, _OPTIONS)
         world, rng = self.world, self.np_random
-        # Given values are drawn, too, so that the others do not depend on the options.
+        # Given options are drawn, too, so that other draws do not depend on them.
         course = self._seeds[int(rng.integers(len(self._seeds)))]
         start = int(rng.integers(2**31))
         look = Look.random(world.course.world, rng) if self._randomise else None
@@ -269,7 +242,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return seen, sum(terms.values()), self._reward.ends(collided), False, info
 
     def _begin(self) -> None:
-        """Begin an episode of the vehicle's limits and sensors."""
+        """Reset the limits and sensors of the robot."""
         raise NotImplementedError
 
     def _observe(self) -> tuple[Any, dict[str, Any]]:
@@ -279,26 +252,19 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def _advance(
         self, values: NDArray[np.float64]
     ) -> tuple[bool | None, dict[str, float], Any, dict[str, Any]]:
-        """Drive for a period; return the collision, the reward, the observation and `info`."""
+        """Drive for a period; return collision, terms of the reward, observation and `info`."""
         raise NotImplementedError
 
     def expert(self) -> ExpertDriver:
-        """Return the expert that knows the whole course, without mistakes, for its control rate."""
-        # Experts, and SciPy for their paths, are only loaded where they drive.
+        """Return an expert that knows the whole course; its control rate must be the robot's."""
+        # Imported here, because experts load SciPy.
         from shapechanger.vehicles.envs.demonstrators import ExpertDriver, require_rate
 
         require_rate(self.metadata["render_fps"])
         return ExpertDriver(self.world)
 
     def demonstrator(self, seed: int) -> Demonstrator:
-        """Return an expert with access to the whole course that recovers from its own mistakes.
-
-        Args:
-            seed: Seed of the mistakes.
-
-        Raises:
-            ProfileError: If the control rates of the robot and of the expert differ.
-        """
+        """Return an expert that recovers from its own mistakes, which `seed` determines."""
         from shapechanger.vehicles.envs.demonstrators import Demonstrator  # SciPy.
 
         self.expert()  # Checks the control rate.

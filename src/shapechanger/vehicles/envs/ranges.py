@@ -30,7 +30,7 @@ COLLISION_REWARD: Final = -3.0
 
 # Distance below which the reward falls, m, and the largest cost, 1/s. Without the cost, teachers
 # squeezed through gaps that a camera with 31 degrees to each side does not show. With the cost,
-# teachers brake and back out, and a student learns this too.
+# teachers brake and drive back, and a student learns this too.
 _NEAR_M, _NEAR_COST = 0.35, 3.0
 _LAYOUT: Final = Layout(
     (
@@ -39,7 +39,7 @@ _LAYOUT: Final = Layout(
         Feature("yaw_rate", "rad/s", -15.0, 15.0),
     )
 )
-_COURSES: Final = range(48)  # To train on. The models of this many stay compiled.
+_COURSES: Final = range(48)  # Courses for training, few enough to keep their compiled models.
 
 
 class MeanOutputs:

@@ -2,7 +2,7 @@
 
 Caps, slew and reflexes are the guard's own functions (`shapechanger.contract.limits`), at its
 rate. Sensors measure as the drivers in `shapechanger.robot.drivers` do from the chips of a twin,
-with their rates and steps, and without noise. A CPU temperature is not simulated and stays absent.
+with their rates and steps, and without noise. The temperature of the CPU is not simulated.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class WheelEncoder:
     def __init__(self, settings: dict[str, Any], world: MujocoWorld) -> None:
         count_m: float = settings["wheel_m"] / settings["counts_per_turn"]
         self._two_channels: bool = settings["b"] >= 0
-        # Both edges of a single channel are passed, and rising ones counted.
+        # A single channel has two edges per count, of which the rising one is counted.
         self._pitch_m = count_m / (_EDGES_PER_COUNT if self._two_channels else 2)
         self._edge_m = self._pitch_m if self._two_channels else count_m
         self._world = world
@@ -64,10 +64,10 @@ class WheelEncoder:
         if self._roll(now_ns, self._world.travelled_m):
             self._last_edge_ns = now_ns
             (first_s, way), (last_s, _) = self._edges[0], self._edges[-1]
-            # All edges go one way.
+            # All edges have the same direction.
             moved_m = way * (len(self._edges) - 1) * self._edge_m
             self._speed = moved_m / (last_s - first_s) if last_s > first_s else 0.0
-        else:  # The next edge is not here yet, which bounds the speed.
+        else:  # The time without a new edge limits the speed.
             since_s = (now_ns - self._last_edge_ns) / 1e9
             if since_s > _STANDS_AFTER_S:
                 self._speed = 0.0
@@ -100,7 +100,7 @@ class WheelEncoder:
 
 
 def _sonar(settings: dict[str, Any], world: MujocoWorld) -> _Read:
-    """Measure the distance ahead; the echo of a ping is there at a later reading."""
+    """Measure the distance ahead; a later reading receives the echo of a ping."""
     pinged_ns: int | None = None
     echo: tuple[int, float] | None = None
     measured: dict[str, float] = {}
@@ -161,9 +161,9 @@ _SENSORS: Final[dict[str, Callable[[dict[str, Any], MujocoWorld], _Read]]] = {
     "mpu6050": _inertia,
     "ina219": _battery,
 }
-"""Simulations of the sensors by the name of their driver."""
+"""Simulations of the sensors, keyed by the name of their driver."""
 
-# Quantities whose sensors are read at each tick: reflexes act on them, or they depend on it.
+# Quantities whose sensors are read at each tick, because reflexes or counted edges need it.
 _AT_EACH_TICK: Final = ("speed", "bump", "distance")
 
 
@@ -179,19 +179,8 @@ _COUNTS: Final = 4096  # Counts of its period.
 class SensedVehicle:
     """A vehicle with the limits and sensors of a robot, which starts at rest.
 
-    Pins, chips, link and emergency stops are not simulated here. A robot's twin simulates them, and
-    drives to the same place.
-
-    Args:
-        plan: Plan of the guard.
-        world: The world.
-
-    Attributes:
-        now_ns: Time since the start, ns.
-        applied: Value of each action.
-        reason: Why the vehicle does not follow its command; empty if it does.
-        quantities: Readings and derived quantities, keyed by name.
-        sources: Name of the sensor of each quantity, or "estimated", keyed by quantity.
+    Pins, chips, link and emergency stops are simulated only in a robot's twin, which drives to the
+    same place.
     """
 
     def __init__(self, plan: GuardPlan, world: MujocoWorld) -> None:
@@ -199,11 +188,11 @@ class SensedVehicle:
         self._world = world
         self._tick_ns = round(1e9 / plan.tick_hz)
         self._steps = [_stepper(output) for output in plan.outputs]
-        self.now_ns = 0
+        self.now_ns = 0  # Time since the start.
         self.applied = tuple(action.rest for action in plan.actions)
-        self.reason = ""
-        self.quantities: dict[str, float] = {}
-        self.sources: dict[str, str] = {}
+        self.reason = ""  # Why the vehicle does not follow its command; empty if it does.
+        self.quantities: dict[str, float] = {}  # Readings and derived quantities.
+        self.sources: dict[str, str] = {}  # Name of the sensor of each quantity, or "estimated".
         self._parts = self._outputs()
         self._reflexes = MotionReflexes(plan)
         self._push = 0.0
@@ -224,7 +213,7 @@ class SensedVehicle:
         return self._reflexes.bump.count
 
     def advance(self, ns: int, command: Sequence[float] | None) -> None:
-        """Advance time, with a round of the limits at each tick; without a command it rests."""
+        """Advance time, and apply the limits at each tick; None keeps the applied actions."""
         actions = self._plan.actions
         aims: tuple[float, ...] | None = None
         clips = ""
@@ -238,7 +227,7 @@ class SensedVehicle:
             self._world.advance(tick_ns / 1e9, self._parts)
             direction = float((self._push > 0.0) - (self._push < 0.0))
             quantities: dict[str, float] = {}
-            if direction == 0.0:  # The zero of a gyroscope follows.
+            if direction == 0.0:  # The gyroscope calibrates its zero.
                 self._read(self._slow, quantities, direction)
             self._read(self._fast, quantities, direction)
             self._reflexes.sense(quantities, False, self._push, self.now_ns)

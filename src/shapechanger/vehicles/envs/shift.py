@@ -23,12 +23,8 @@ _HALF, _THROTTLE, _STEERING = 20, 0.5, -0.5
 def certify_vehicles(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> str:
     """Compare two vehicles, including wrappers, and return the certificate of their shift.
 
-    The certificate lists differences of properties, and of rollouts with the same commands. Both
-    envs are reset and stepped, and remain in the middle of an episode.
-
-    Raises:
-        MorphologyError: If one of the envs is not a vehicle.
-        EmptyShift: If the rollouts give the same observations, poses and rewards.
+    Both envs are reset and stepped, and remain in the middle of an episode. Raises EmptyShift if
+    the rollouts give the same observations, poses and rewards.
     """
     names = _name(source), _name(target)
     old, new = _facts(source), _facts(target)
@@ -77,7 +73,7 @@ def _answers(
     sentences = [
         f"straight ahead at a {forward} of {_THROTTLE:g} for {_HALF} steps: {moved[0]:.2f} m -> "
         f"{moved[1]:.2f} m",
-        f"then a {aside} of {_STEERING:g} for as many: turned by {turned[0]:.0f} -> "
+        f"then a {aside} of {_STEERING:g} for {_HALF} steps: turned by {turned[0]:.0f} -> "
         f"{turned[1]:.0f} degrees",
     ]
     if one[2].shape == two[2].shape:

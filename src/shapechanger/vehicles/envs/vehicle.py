@@ -25,7 +25,7 @@ from shapechanger.vehicles.waypoints import SteeringResponse, WaypointView, meas
 if TYPE_CHECKING:
     from shapechanger.vehicles.envs.demonstrators import Demonstrator
 
-_REWARDED: Final = ("speed", "stall", "collision")  # Quantities that the reward needs.
+_REWARDED: Final = ("speed", "stall", "collision")  # Quantities on which the reward depends.
 
 
 class VehicleEnv(DriveEnv):
@@ -174,14 +174,9 @@ class VehicleEnv(DriveEnv):
         return f"shapechanger/{self.world.vehicle.name.capitalize()}Ranges-v1"
 
     def taught_by(self, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int) -> Demonstrator:
-        """Return a teacher as the demonstrator of this env.
+        """Return a teacher as the demonstrator of this env; `seed` determines its disturbances.
 
-        Args:
-            act: Policy of `teacher_env`: maps observations, (n, 11), to actions, (n, 2).
-            seed: Seed of the demonstrator's random disturbances.
-
-        Raises:
-            ProfileError: If the control rates of the robot and of the teacher differ.
+        `act` is a policy of `teacher_env`: it maps observations, (n, 11), to actions, (n, 2).
         """
         from shapechanger.vehicles.envs.demonstrators import Demonstrator, require_rate  # SciPy.
 

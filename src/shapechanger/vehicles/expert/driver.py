@@ -32,40 +32,23 @@ from shapechanger.vehicles.expert.path import CoursePath, plan_path
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Driving properties of a vehicle, tuned on training courses.
-
-    Attributes:
-        body: Model of the vehicle.
-        drive: Kind of steering: front wheels, two tracks, or a rudder.
-        margin_m: Smallest clearance on each side, which the corners of the hull, a trailer that
-            cuts corners, and errors need.
-        comfort_m: Preferred clearance.
-        cruise: Share of the top speed on free, straight lanes.
-        lateral_limit: Largest lateral acceleration, m/s2.
-        braking: Reliable deceleration, m/s2.
-        look_m: Look-ahead distance at rest, m.
-        look_s: Additional look-ahead distance per speed, s.
-        turn: Effect of full steering: for wheels the curvature, tan(full lock) divided by the
-            wheelbase, 1/m; for tracks the rate of turn, rad/s; for a rudder the rate of turn
-            divided by the speed, rad/m.
-        dead: Dead band of a tank's steering, caused by friction of the tracks.
-        sway: Standard deviation of steering noise that the driver can correct.
-        least_throttle: Smallest throttle while driving forward; negative values brake.
-    """
+    """Driving properties of a vehicle, tuned on training courses."""
 
     body: VehicleModel
     drive: Literal["wheels", "tracks", "rudder"]
-    margin_m: float
-    comfort_m: float
-    cruise: float
-    lateral_limit: float
-    braking: float
-    look_m: float
-    look_s: float
+    margin_m: float  # Smallest clearance on each side, for the corners of the hull and for errors.
+    comfort_m: float  # Preferred clearance.
+    cruise: float  # Share of the top speed on free, straight lanes.
+    lateral_limit: float  # Largest lateral acceleration, m/s2.
+    braking: float  # Reliable deceleration, m/s2.
+    look_m: float  # Look-ahead distance at rest, m.
+    look_s: float  # Additional look-ahead distance per speed, s.
+    # Effect of full steering: for wheels the curvature, tan(full lock) divided by the wheelbase,
+    # 1/m; for tracks the rate of turn, rad/s; for a rudder the rate of turn per speed, rad/m.
     turn: float
-    dead: float = 0.0
-    sway: float = 0.25
-    least_throttle: float = 0.0
+    dead: float = 0.0  # Dead band of a tank's steering, caused by friction of the tracks.
+    sway: float = 0.25  # Standard deviation of steering noise that the driver can correct.
+    least_throttle: float = 0.0  # Smallest throttle while driving forward; negative values brake.
 
     @property
     def half_width_m(self) -> float:
@@ -92,8 +75,8 @@ def traits_of(name: str) -> Traits:
 def plan_path_for(course: Course, traits: Traits) -> CoursePath:
     """Plan a path for a vehicle, with two thirds of its margin if the whole margin does not fit.
 
-    Corridors are made for land vehicles. A boat needs wider passages than 6 of the first 1,300
-    training courses have.
+    Corridors are made for land vehicles: 6 of the first 1,300 training courses have passages that
+    are too narrow for the whole margin of a boat.
     """
     half_width_m, margin_m, comfort_m = traits.half_width_m, traits.margin_m, traits.comfort_m
     try:
@@ -148,8 +131,8 @@ _BACK_AT_MOST_S: Final = 4.0
 _BACK_THROTTLE: Final = -0.6
 _SPEED_GAIN: Final = 1.5  # Gain from speed error to throttle, both relative to their maxima.
 _REACTION_S: Final = 0.15  # Delay from an action to its effect, over which the pose is predicted.
-# Angle to the target, rad, above which a vehicle must turn before it drives on, and the clearance
-# ahead of the nose, m, below which it cannot turn.
+# Angle to the target, rad, above which a vehicle must turn before it drives on; and clearance ahead
+# of the nose, m, below which it cannot turn.
 _ASIDE: Final = 0.7
 _BLOCKED_M: Final = 0.15
 
@@ -177,8 +160,8 @@ class _Recovery:
         turned = self._traits.drive == "tracks" and abs(action[0]) > _ASKED
         straight = abs(yaw_rate) < _TURNING  # Turning on the spot is progress.
         still = share < _STILL and straight
-        # With its bow at a wall, a boat turns until its stern touches too and it cannot move, and a
-        # car scrapes along the wall. A tank can turn away on the spot.
+        # Only a tank can turn away from a wall on the spot. A car would scrape along the wall, and
+        # the stern of a boat would touch the wall too.
         still |= blocked and share < _SLOW and action[1] > 0 and self._traits.drive != "tracks"
         self._still_s = self._still_s + PERIOD_S if still and (driven or turned) else 0.0
         self._slow_s = self._slow_s + PERIOD_S if share < _SLOW and straight and driven else 0.0
@@ -222,17 +205,10 @@ class _Recovery:
 
 
 class CourseExpert:
-    """Drives a vehicle around a course, along a planned path.
+    """Drives a vehicle around a course, along a path, which is planned unless given.
 
-    Args:
-        course: The course.
-        vehicle: Name of the vehicle: "car", "tank", "truck" or "boat".
-        seed: Seed of the recovery manoeuvres.
-        path: The path, if it is already planned.
-
-    Attributes:
-        path: Path that the expert follows.
-        speeds: Speed at each point of the path, m/s, (N,).
+    `seed` determines the recovery manoeuvres. `speeds` are the speeds at the points of the path,
+    m/s, (N,).
     """
 
     def __init__(
@@ -255,10 +231,7 @@ class CourseExpert:
     def act(self, pose: Pose, speed: float, yaw_rate: float = 0.0) -> NDArray[np.float32]:
         """Choose steering and throttle, -1 to 1, (2,), once per period; -1 steers left.
 
-        Args:
-            pose: Pose of the vehicle.
-            speed: Speed along the heading, m/s.
-            yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
+        `speed` is along the heading, m/s; `yaw_rate`, rad/s, is counter-clockwise from above.
         """
         if self._station is None:
             self.reset(pose)
@@ -316,7 +289,7 @@ class CourseExpert:
         return float(self._obstacles.distance(np.array([nose]))[0])
 
     def _soon(self, pose: Pose, speed: float, yaw_rate: float) -> Pose:
-        """Predicted pose when the current action takes effect."""
+        """Return the predicted pose at the time when the current action takes effect."""
         ahead = speed * _REACTION_S
         heading = pose.heading + yaw_rate * _REACTION_S / 2
         return Pose(

@@ -28,10 +28,10 @@ _SLOPES: Final = np.arange(-2, 3)  # Changes of the offset between stations, in 
 _BEND_COST: Final = 0.15
 _SLANT_COST: Final = 0.02
 _NARROW_COST: Final = 1.0
-# Length of the search beyond a whole lap, m. A way hardly depends on the offset at which the search
-# began that far back, so a lap from the middle of the search is closed.
+# Length of the search beyond a whole lap, m. Six metres after the start, the way hardly depends on
+# the first offset, so the lap from there on is closed.
 _OVERLAP_M: Final = 12.0
-# Over-relaxation: 1.5 to 1.8 converge faster than 1 (S. Boyd et al., "Distributed Optimization and
+# A relaxation of 1.5 to 1.8 converges faster than 1 (S. Boyd et al., "Distributed Optimization and
 # Statistical Learning via the Alternating Direction Method of Multipliers", 2011, section 3.4.3).
 _ROUNDS: Final = 150
 _RELAXATION: Final = 1.6
@@ -218,16 +218,10 @@ def _least_bent(middle: Array, left: Array, low: Array, high: Array, wish: Array
 
 
 class CoursePath(ClosedLine):
-    """A closed, evenly spaced path around a course: a periodic cubic spline through points.
+    """A closed, evenly spaced path: a periodic cubic spline through `knots`, m, (n, 2).
 
-    Args:
-        knots: The points, m, (n, 2).
-        obstacles: Distances to the walls and obstacles of the course.
-
-    Attributes:
-        heading: Direction at each point, rad, counter-clockwise from the x axis, (N,).
-        curvature: Curvature at each point, 1/m, positive to the left, (N,).
-        clearance: Distance of each point from the nearest wall or obstacle, m, (N,).
+    At each of the N points, `heading` is the direction, rad, counter-clockwise from the x axis;
+    `curvature`, 1/m, is positive to the left; `clearance` is the distance from obstacles, m.
     """
 
     def __init__(self, knots: Array, obstacles: ClearanceField) -> None:
@@ -254,11 +248,7 @@ def plan_path(
 ) -> CoursePath:
     """Plan a smooth path around a course, or raise a `WorldError` if there is no path.
 
-    Args:
-        course: The course.
-        half_width_m: Half width of the vehicle, m.
-        margin_m: Smallest clearance on each side of the vehicle, m.
-        comfort_m: Preferred clearance on each side of the vehicle, m.
+    The path keeps a clearance of `margin_m` on each side of the vehicle, and prefers `comfort_m`.
     """
     lattice = _Lattice(course, half_width_m + margin_m, half_width_m + comfort_m)
     # A line between two lattice points may come closer to obstacles, so first try extra clearance.

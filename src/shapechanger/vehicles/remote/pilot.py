@@ -38,16 +38,9 @@ _WAITS_ON_BOARD: Final = "It waits until no client has control and you arm the r
 
 
 def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
-    """Raise an error that names the difference if a policy does not fit a robot.
+    """Raise PolicyError or RobotRefused, naming the difference, if a policy does not fit a robot.
 
-    Args:
-        card: Card of the policy.
-        robot: Card of the robot.
-        measures: Whether the vehicle's turning can be measured before the policy drives.
-
-    Raises:
-        PolicyError: If body, rate, actions or state differ.
-        RobotRefused: If the robot lacks a camera, or the card lacks its geometry or the turning.
+    `measures` is whether the vehicle's turning can be measured before the policy drives.
     """
     net = card.network
     if net.body and net.body != robot.body:
@@ -82,11 +75,7 @@ def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
 
 
 def require_policies(path: Path, robot: RobotCard) -> None:
-    """Check that the policy, or each policy of the folder, at `path` can drive a robot on board.
-
-    Raises:
-        PolicyError: If there is no policy, or a policy does not fit the robot.
-    """
+    """Raise PolicyError unless the policy, or each policy of the folder, at `path` fits a robot."""
     if not path.exists():
         raise PolicyError(no_policy_file(path, what="file or folder"))
     files = [path] if path.suffix == ENDING else []
@@ -112,16 +101,8 @@ class PolicyDriver:
     """Drives a robot by a policy from a person's permission to the person's next intervention.
 
     `run` drives in the thread that calls it. As a context manager, the driver has its own thread.
-
-    Args:
-        policy: The policy.
-        name: Displayed name.
-        robot: Address and credentials of the robot.
-        on_note: Called with the driver's state, as text, whenever the state changes.
-        waits: Text to display while the driver waits; "" for instructions at a terminal.
-
-    Attributes:
-        note: State of the driver, as text for display.
+    `note` is its state as text; `on_note` is called whenever it changes. `waits` is the text to
+    display while the driver waits; "" for instructions at a terminal.
     """
 
     def __init__(
@@ -235,7 +216,7 @@ def main() -> int:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 
     def tell(**said: str) -> None:
-        with contextlib.suppress(OSError):  # The daemon has ended, and with it the connection.
+        with contextlib.suppress(OSError):  # The daemon has ended.
             out.write(json.dumps({name: text[:400] for name, text in said.items()}) + "\n")
 
     task = json.loads(sys.stdin.readline())
@@ -250,7 +231,7 @@ def main() -> int:
             policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
         )
 
-        def end_with_input() -> None:  # The daemon closes the input, at the latest when it ends.
+        def end_with_input() -> None:  # The daemon closes the input to end the policy.
             while sys.stdin.readline():
                 pass
             driver.end()
