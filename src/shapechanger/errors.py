@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import glob
 import operator
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Collection, Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -50,6 +50,13 @@ class UnknownName(ShapechangerError, ValueError):
         listed += f" and {more} more" if more > 0 else ""
         message = f"No {self.kind} matches {self.name!r}.{hint} There are: {listed}."
         return f"{message} {self.instead}".rstrip()
+
+
+def require_known(kind: str, known: Collection[str], *names: object) -> None:
+    """Raise UnknownName for the first name that is not among the known ones."""
+    for name in names:
+        if name not in known:
+            raise UnknownName(kind, str(name), known)
 
 
 class LayoutError(ShapechangerError, ValueError):

@@ -107,7 +107,7 @@ _WAVES: Final = 4
 # With a spread above 1, signals are more often near the ends of a range than in its middle. Moment
 # arms have the largest effect near the ends.
 _SPREAD: Final = 1.5
-# Distance of the commanded posture from either end of a joint's range, as a fraction of it.
+# Distance of the commanded posture from each end of a joint's range, as a share of the range.
 _MARGIN: Final = 0.05
 # Largest commanded distance of the end joint from its coupled angle, rad: beyond `DIP_BAND`, but
 # within the strength of the tendons.
@@ -115,7 +115,7 @@ _DIP_OFF: Final = math.radians(20.0)
 # Range of the lowest tension, which varies over time, N. Slack tendons would not reveal the moment
 # arms, and constant tensions would not reveal the stretch.
 _LEAST_N: Final = (2.0, 4.5)
-# Time constant of the correction of joint errors, s: long enough not to oscillate with delay.
+# Time constant of the correction of joint errors, s: with a delay, a shorter one would oscillate.
 _BACK_S: Final = 0.25
 # Limit of the corrected joint error, rad, for example if a joint is stuck at its limit.
 _MOST_OFF: Final = 0.4
@@ -124,17 +124,9 @@ _MOST_OFF: Final = 0.4
 class FingerBabble:
     """Controller that moves the joints along independent smooth random motions.
 
-    The controller assumes the nominal finger, and corrects errors of the measured angles. The
-    lowest tensions vary over time. It also works on a rig, because the layout locates the angles.
-
-    Args:
-        layout: Layout of the observations, with a feature `JOINT/angle` for each joint.
-        actions: Meaning of an action.
-        seed: Seed of the motions.
-        control_dt: Duration of an action, s.
-
-    Raises:
-        UnknownName: If the layout lacks an angle, or the mode of action is unknown.
+    The controller assumes the nominal finger, and corrects errors of the measured angles, the
+    features `JOINT/angle` of the layout. The lowest tensions vary over time. An action, whose
+    meaning is `actions`, lasts `control_dt` seconds.
     """
 
     def __init__(

@@ -18,7 +18,7 @@ from shapechanger.contract.env_ref import Measure
 from shapechanger.envs.checks import check_action
 from shapechanger.envs.opengl import choose_gl, require_screen
 from shapechanger.envs.renderer import Renderer, body_reach, draw
-from shapechanger.errors import FingerError, UnknownName, check_seed
+from shapechanger.errors import FingerError, check_seed, require_known
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.gap import Gap, geared_around, resolve_gap, with_gears
 from shapechanger.finger.model import TARGET, FingerFigure
@@ -110,9 +110,8 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         width: int = _PICTURE,
         height: int = _PICTURE,
     ) -> None:
-        if render_mode not in (None, *_MODES):
-            raise UnknownName("render mode", str(render_mode), _MODES)
         if render_mode is not None:
+            require_known("render mode", _MODES, render_mode)
             (require_screen if render_mode == "human" else choose_gl)()
         if gap is not None and parameters is not None:
             raise FingerError("Give either parameters or a gap to draw them from, not both.")
@@ -122,7 +121,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self.width, self.height = width, height
         self._actions = actions
         self._gap = None if gap is None else resolve_gap(gap)
-        self._is_drawn_anew = gap is not None and finger_seed is None
+        self._is_drawn_anew = gap is not None and finger_seed is None  # At each reset.
         self._reward = FingertipReward.from_weights(reward or {})
         self._figure: FingerFigure | None = None
         self._renderer: Renderer | None = None
@@ -150,9 +149,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     def _place(self, options: dict[str, Any] | None) -> FingerSenses:
         """Draw the finger if each episode has another one, and put the finger at a start."""
-        for name in options or {}:
-            if name not in self._options:
-                raise UnknownName("option of reset", name, self._options)
+        require_known("option of reset", self._options, *(options or {}))
         if self._is_drawn_anew and self._gap is not None:
             self._use(self._gap.draw(self.np_random))
         given = (options or {}).get("posture")
@@ -295,13 +292,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     ) -> NDArray[np.uint8]:
         """Return an image of the present finger, shape (height, width, 3).
 
-        Args:
-            width: Width in pixels.
-            height: Height in pixels.
-            reach: Metres in view around the middle of the finger; None for the finger's reach.
-
-        Raises:
-            RenderError: If this machine cannot render.
+        `reach` is the radius in view around the middle of the finger, m; None for its own reach.
         """
         figure = self._shown()
         model = figure.model.__copy__()
@@ -320,15 +311,9 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def identified_source(self, seed: int) -> dict[str, Any]:
         """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
 
-        A log hardly reveals parameters of the motors. For a finger with a command path, they are
-        drawn for each episode as in the gap "wide".
-
-        Args:
-            seed: Seed of the motions, which last ten seconds.
-
-        Raises:
-            FingerError: If the motions do not suffice, or observations are not a vector.
-            MissingExtra: If `mujoco.sysid` is not installed.
+        The finger moves for ten seconds, determined by `seed`. A log hardly reveals parameters of
+        the motors. For a finger with a command path, they are drawn for each episode as in the gap
+        "wide".
         """
         # Imported here, because an env that only steps does not need the optimiser.
         from shapechanger.finger.identify import identify, record_babble
@@ -344,22 +329,14 @@ FingerLike = FingerParameters | Mapping[str, Any] | str
 
 
 def as_finger(value: FingerLike | None) -> FingerParameters:
-    """Return the parameters of a finger; the nominal finger for None.
-
-    Raises:
-        UnknownName: If a set or parameter is unknown.
-        FingerError: If the parameters contradict each other, or the tendons cannot balance a joint.
-    """
+    """Return the parameters of a finger; the nominal finger for None."""
     given: Any = NOMINAL if value is None else value
     if isinstance(given, str):
         is_json = given.lstrip().startswith("{")
         given = FingerParameters.from_json(given) if is_json else named_set(given)
     elif isinstance(given, Mapping):
         named = cast("Mapping[str, Any]", given)
-        known = FingerParameters.__struct_fields__
-        for name in named:
-            if name not in known:
-                raise UnknownName("parameter of a finger", name, known)
+        require_known("parameter of a finger", FingerParameters.__struct_fields__, *named)
         given = NOMINAL.replace(**named)
     if not isinstance(given, FingerParameters):
         raise FingerError(f"Parameters of a finger must be numbers or JSON, got {given!r}.")

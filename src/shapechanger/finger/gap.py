@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import FingerError, UnknownName
+from shapechanger.errors import FingerError, require_known
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters, converted
 from shapechanger.finger.tensions import spans_all_torques
 
@@ -83,11 +83,7 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 raise FingerError(f"{name}: the range {value} must begin above zero.")
 
     def draw(self, rng: np.random.Generator) -> FingerParameters:
-        """Draw a finger whose tendons can balance its joints.
-
-        Raises:
-            FingerError: If the tendons of hardly any finger of the gap can balance the joints.
-        """
+        """Draw a finger whose tendons can balance its joints."""
         values: dict[str, Any] = {"moment_arms": self._arms(rng)}
 
         def drawn(name: str) -> float:
@@ -136,8 +132,8 @@ _REAL_LIKE: Final = Gap(
     # The rig pulls with 1 to 15 N; the nominal finger with up to 25 N.
     strength=(0.55, 0.65),
     least_tension=(1.0, 1.0),
-    # Seen from the tendon, a rotor has 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's
-    # numbers (`shapechanger/robot/drivers/servos/servos.toml`) converted by the spool's radius.
+    # At the tendon, a rotor has 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's numbers
+    # (`shapechanger/robot/drivers/servos/servos.toml`) converted by the spool's radius.
     motor_kg=(1.2, 1.6),
     tendon_damping=(3.0, 5.0),
     tendon_friction=(0.3, 0.8),
@@ -218,16 +214,10 @@ def geared_around(found: FingerParameters) -> Gap:
 
 
 def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:
-    """Return the gap for a `Gap`, a name or a mapping of ranges.
-
-    Raises:
-        UnknownName: If the name is unknown.
-        FingerError: If the ranges are malformed.
-    """
+    """Return the gap for a `Gap`, a name or a mapping of ranges."""
     if isinstance(value, Gap):
         return value
     if isinstance(value, str):
-        if value not in GAPS:
-            raise UnknownName("gap", value, GAPS)
+        require_known("gap", GAPS, value)
         return GAPS[value]
     return converted("The ranges of a gap are malformed", value, Gap)

@@ -47,8 +47,8 @@ _SIM_DT_GEARED: Final = 0.001
 _GEARED_KG: Final = 0.5
 """Mass above which motors count as geared, kg."""
 
-# Shortest history of commands of a motor with a delay, s. Fingers with shorter delays keep the same
-# history, so their arrays have the same shapes.
+# Shortest history of commands of a motor with a delay, s. Up to this delay, fingers have arrays of
+# the same shapes.
 _KEPT_S: Final = 0.020
 
 FINGERTIP: Final = "fingertip"
@@ -85,11 +85,7 @@ def build_finger(
     have a command path, controls are tensions instead: -1 is the least and 1 the most tension; see
     `HeldTensions`. Tendons are named as in `TENDONS`. Their lengths, m, are 0 for the straight
     finger. An elastic tendon has a motor: a slide joint such as `FDP/motor` that winds it up.
-
-    Args:
-        parameters: Parameters of the finger.
-        drive: Drive of its tendons.
-        anatomy: Whether to add bones and tendon routes for images; the motion is the same.
+    `anatomy` adds bones and tendon routes for images; the motion is the same.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "finger"
@@ -148,7 +144,7 @@ def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
         for j in (j for j, (moved, _) in enumerate(_HINGES) if moved == k):
             stiffness = parameters.joint_stiffness[j]
             farther = max(abs(JOINT_RANGE[j] - JOINT_REST[j]))
-            # The stiffness of the torque k x + c x³ at the end is END_STIFFNESS times k.
+            # At the end of the range, the torque k x + c x³ has the stiffness END_STIFFNESS k.
             rise = (END_STIFFNESS - 1.0) / (3.0 * farther**2)
             body.add_joint(
                 name=JOINTS[j],
@@ -217,7 +213,7 @@ def _add_tendon(
         ctrllimited=True,
         ctrlrange=[-1.0, 1.0],
         forcelimited=True,
-        # `sign` is the sign of a pulling force.
+        # A pulling force has the sign `sign`.
         forcerange=sorted((sign * parameters.least_tension, sign * parameters.most_tension[i])),
         dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
         gaintype=mujoco.mjtGain.mjGAIN_AFFINE,

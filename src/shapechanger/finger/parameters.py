@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import FingerError, UnknownName
+from shapechanger.errors import FingerError, require_known
 from shapechanger.finger.anatomy import (
     AN_1983_ARMS,
     JOINT_DAMPING,
@@ -31,7 +31,7 @@ Arms = tuple[tuple[float, float, float, float], ...]
 
 
 def as_numbers(value: Any) -> NDArray[np.float64]:
-    """Return a value as an array of floats; an empty one if it cannot be converted."""
+    """Return a value as an array of floats; an empty array if it cannot be converted."""
     try:
         return np.asarray(value, np.float64)
     except (TypeError, ValueError):
@@ -138,10 +138,8 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         numbers = msgspec.structs.asdict(self)
         path: Any = numbers.pop("path")
         if isinstance(path, Mapping):
-            known = CommandPath.__struct_fields__
-            for name in cast("Mapping[str, Any]", path):
-                if name not in known:
-                    raise UnknownName("parameter of a command path", str(name), known)
+            names = cast("Mapping[str, Any]", path)
+            require_known("parameter of a command path", CommandPath.__struct_fields__, *names)
             path = converted("A command path is malformed", path, CommandPath)
             msgspec.structs.force_setattr(self, "path", path)
         if self.tendon_stiffness is None:
@@ -188,11 +186,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         return self.backlash + self.least_tension / self.tendon_stiffness
 
     def replace(self, **changes: Any) -> FingerParameters:
-        """A copy with some parameters replaced.
-
-        Raises:
-            FingerError: If the changed parameters are invalid.
-        """
+        """A copy with some parameters replaced."""
         return msgspec.structs.replace(self, **changes)
 
     def to_json(self) -> str:
@@ -201,11 +195,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
     @classmethod
     def from_json(cls, text: str | bytes) -> FingerParameters:
-        """Decode the result of `to_json`.
-
-        Raises:
-            FingerError: If the text is not a valid finger.
-        """
+        """Decode the result of `to_json`, or raise a FingerError."""
         try:
             return msgspec.json.decode(text, type=cls)
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:
@@ -225,6 +215,5 @@ PARAMETER_SETS: Final[Mapping[str, FingerParameters]] = MappingProxyType(
 
 def named_set(name: str) -> FingerParameters:
     """Return a set of parameters; raise UnknownName for an unknown name."""
-    if name not in PARAMETER_SETS:
-        raise UnknownName("set of finger parameters", name, PARAMETER_SETS)
+    require_known("set of finger parameters", PARAMETER_SETS, name)
     return PARAMETER_SETS[name]

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from shapechanger.errors import PathError, UnknownName
+from shapechanger.errors import PathError, require_known
 from shapechanger.files import read_text
 from shapechanger.finger.parameters import as_numbers
 
@@ -46,26 +46,14 @@ class FingertipPath:
 
     A closed path is periodic, also before 0 s. An open path begins at 0 s and ends at `duration_s`.
     Before its beginning and after its end, the point is at rest.
-
-    Attributes:
-        position: Positions, m, shape (n, 3), at times from 0 to `duration_s`, s, shape (n,).
-        duration_s: Period of a closed path, or duration of an open one, s, above 0; infinite for an
-            endless function.
-        closed: Whether the path is periodic.
     """
 
-    position: Callable[[Array], Array]
-    duration_s: float
-    closed: bool
+    position: Callable[[Array], Array]  # Maps times, 0 to `duration_s`, (n,), to m, (n, 3).
+    duration_s: float  # Period, or duration of an open path; infinite for an endless function.
+    closed: bool  # Whether the path is periodic.
 
     def at(self, t: ArrayLike) -> Array:
-        """Return the positions of the point at times.
-
-        Args:
-            t: Times, s, finite, of any shape and sign.
-
-        Returns:
-            Positions in the finger's frame, m, shape (..., 3).
+        """Return positions in the finger's frame, m, (..., 3), at finite times, s, (...).
 
         Raises:
             PathError: If a time is not finite, or a function returns no position for it.
@@ -376,17 +364,12 @@ KINDS: Final = tuple(_SHAPES)
 
 
 def as_path(value: PathSource) -> FingertipPath:
-    """Return the path that a value describes.
+    """Return the path that a value describes, or raise UnknownName or PathError.
 
-    Args:
-        value: A path; the name of a shape, one of `KINDS`; a mapping with such a name as "kind" and
-            with arguments of the function that makes the shape, such as
-            `{"kind": "circle", "radius": 0.01, "hz": 1.0}`; the name of a .csv file for `from_csv`;
-            or a function for `from_callable`, which makes an endless path.
-
-    Raises:
-        UnknownName: If the name of the shape or of a setting is unknown.
-        PathError: If the value has another type, or the path is invalid.
+    The value is a path; the name of a shape, one of `KINDS`; a mapping with such a name as "kind"
+    and with arguments of the function that makes the shape, such as
+    `{"kind": "circle", "radius": 0.01, "hz": 1.0}`; the name of a .csv file for `from_csv`; or a
+    function for `from_callable`, which makes an endless path.
     """
     given: Any = value
     if isinstance(given, FingertipPath):
@@ -398,12 +381,9 @@ def as_path(value: PathSource) -> FingertipPath:
     if isinstance(given, Mapping) and "kind" in given:
         settings = dict(cast("Mapping[str, Any]", given))
         kind = str(settings.pop("kind"))
-        if kind not in _SHAPES:
-            raise UnknownName("path", kind, KINDS)
-        known = tuple(inspect.signature(_SHAPES[kind]).parameters)
-        for name in settings:
-            if name not in known:
-                raise UnknownName(f"setting of {kind!r}", str(name), known)
+        require_known("path", KINDS, kind)
+        known = inspect.signature(_SHAPES[kind]).parameters
+        require_known(f"setting of {kind!r}", known, *settings)
         return _SHAPES[kind](**settings)
     if callable(cast("Any", given)):
         return from_callable(cast("Callable[[float], ArrayLike]", given))

@@ -64,7 +64,7 @@ class FingerPlant:
         self.parameters = parameters
         self.model: mujoco.MjModel = build_finger(parameters, drive).compile()
         self.data = mujoco.MjData(self.model)
-        # This array is a view, because reading the warnings one by one takes longer than a step.
+        # A view of all counters, because reading the warnings one by one takes longer than a step.
         self._warnings: NDArray[np.int32] = cast("Any", self.data.warning).number
         self._drive = drive
         timestep = self.model.opt.timestep
@@ -160,10 +160,6 @@ class HeldTensions:
     During a command, which lasts `control_dt` seconds, tensions are computed `computations` times.
     After each computation they are sent in `ticks` ticks with a limited slew. A tick lasts `steps`
     simulation steps of `timestep` seconds.
-
-    Raises:
-        FingerError: If a command does not last a whole number of computations, or a tick a whole
-            number of simulation steps.
     """
 
     def __init__(

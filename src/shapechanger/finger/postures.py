@@ -123,10 +123,10 @@ def angles_for(
 ) -> tuple[NDArray[np.float64], float]:
     """Return joint angles whose fingertip is closest to a point: inverse kinematics.
 
-    Damped Gauss-Newton steps, kept within the joints' ranges. Among the angles for a point, m,
-    (3,), angles near the start with the end joint within the band of the hood are preferred. `near`
-    are angles to start from, rad, (4,); by default the angles at rest. The second result is the
-    distance of the fingertip from the point, m.
+    The search takes damped Gauss-Newton steps within the joints' ranges from the angles `near`,
+    rad, (4,), by default at rest. Among the angles for a point, m, (3,), angles near the start with
+    the end joint within the band of the hood are preferred. The second result is the distance of
+    the fingertip from the point, m.
     """
     best = _search(place, JOINT_REST if near is None else near)
     if best[1] > _FAR_M:

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import FingerError, RobotRefused, UnknownName, check_seed
+from shapechanger.errors import FingerError, RobotRefused, check_seed, require_known
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.env import FingerEnv
 from shapechanger.finger.gap import GAPS, with_gears
@@ -41,7 +41,7 @@ _SLACK_S: Final = 0.6
 # which may have to wait for a busy machine.
 _TIMEOUT_S: Final = 2.0
 _OWN_TIMEOUT_S: Final = 30.0
-# Prefixes of infos that concern driving only.
+# Prefixes of the keys of `info` that concern driving only.
 _DRIVING: Final = ("reward", "frame", "captured_ns")
 # Arguments that `FingerEnv` also has.
 _SHARED: Final = ("reward", "render_mode", "width", "height")
@@ -208,7 +208,7 @@ class RigMixin(FingerEnv):
             if way.off(senses) < _START_OFF_RAD:
                 break
             senses = self._on_the_way(way.values(senses))
-        # The simulation also starts with the command for the present tensions.
+        # As in the simulation, the first command is the one that gives the present tensions.
         tensions = np.clip(senses.tensions, rig.least, rig.most)
         command = self.drive.command(tensions, senses.lengths, rig.speeds)
         self._command = np.clip(command, -1.0, 1.0)
@@ -219,7 +219,7 @@ class RigMixin(FingerEnv):
         self._command = command
         rig = self._rig_senses
         if rig.controls_length:
-            # Length at which the drive pulls with the least tension.
+            # Send the lengths at which the drive pulls with the least tension.
             still = self.drive.tension(command, np.zeros(len(TENDONS)), np.zeros(len(TENDONS)))
             return self._send(rig.length_values((rig.least - still) / self.drive.stiffness))
         lengths = cast("FingerSenses", self._senses).lengths
@@ -356,8 +356,8 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
 
 def _serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
     """Serve the package's finger profile on a twin with its own clock."""
-    if twin not in ("", NOMINAL_TWIN, *GAPS):
-        raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))
+    if twin:
+        require_known("twin of a finger", (NOMINAL_TWIN, *GAPS), twin)
     if twin not in GAPS and finger_seed is not None:
         raise FingerError("finger_seed selects a finger of a gap, so `twin` must name a gap.")
     seed = check_seed(0 if finger_seed is None else finger_seed, FingerError, "finger_seed must be")

@@ -18,7 +18,7 @@ from shapechanger.layout import Layout
 # Length error, m, above which a servo must have lost a turn (30 mm on a small spool).
 _MISFIT_M: Final = 0.012
 _COMPLIANCE: Final = 1.0 / 20e3  # Assumed compliance of the cables, m/N, as on a twin.
-_ABOVE_REST: Final = 1e-3
+_ABOVE_REST: Final = 1e-3  # Smallest command of a length, because 0 is the pretension.
 _QUANTITIES: Final = ("length", "speed", "tension")
 
 
@@ -28,15 +28,9 @@ class RigSenses:
     With encoders at the joints, angles are measured, and velocities are smoothed differences over
     one control period, as in `FingerPlant` with noisy joints. Otherwise angles are fitted to the
     seven lengths by least squares, with corrections for stretch, the nominal moment arms and the
-    ranges of the joints, and velocities are computed from the speeds of the tendons.
-
-    Attributes:
-        most: Largest tension of each tendon, N, (7,).
-        least: Tension of each tendon at command 0, N, (7,).
-        controls_length: Whether commands are lengths, at tensions of at most `most`.
-
-    Raises:
-        RobotRefused: If the rig has other tendons, or does not measure them.
+    ranges of the joints, and velocities are computed from the speeds of the tendons. `least` and
+    `most` are the tensions at the commands 0 and 1, N, (7,). If the rig `controls_length`, commands
+    are lengths, at tensions of at most `most`.
     """
 
     def __init__(self, robot: str, action_layout: Layout, state_layout: Layout) -> None:
@@ -69,10 +63,10 @@ class RigSenses:
         # Least squares; positive arms shorten the tendons.
         self._angles_of = np.linalg.pinv(-MOMENT_ARMS)
         self._state = np.zeros(state_layout.size)
-        encoders = [f"{name}/angle" for name in JOINTS]
         # Indices of the encoders; empty unless each joint has an encoder.
-        self._encoders = [self._starts[name] for name in encoders if name in self._starts]
-        self._encoders = self._encoders if len(self._encoders) == len(JOINTS) else []
+        encoders = [f"{name}/angle" for name in JOINTS if f"{name}/angle" in self._starts]
+        is_complete = len(encoders) == len(JOINTS)
+        self._encoders = [self._starts[name] for name in encoders] if is_complete else []
         self._differences = JointVelocities()
 
     def forget(self) -> None:
@@ -96,7 +90,6 @@ class RigSenses:
 
     def length_values(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the command of a rig that controls lengths, m, (7,), clipped to their range."""
-        # 0 is the pretension, not the longest length.
         shares = np.clip((self._longest - lengths) / self._span, _ABOVE_REST, 1.0)
         return shares[self._order].astype(np.float32)
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shapechanger.errors import UnknownName
+from shapechanger.errors import require_known
 from shapechanger.finger.anatomy import (
     JOINT_RANGE,
     JOINTS,
@@ -98,43 +98,24 @@ _NEAR_M: Final = 0.002
 
 @dataclass(frozen=True, slots=True)
 class FingertipReward:
-    """Weights of the reward for a fingertip near a point or a path.
+    """Weights of the reward for a fingertip near a point or a path."""
 
-    Attributes:
-        nearness: Reward per second at the target, 1/s.
-        effort: Cost per second at full tension of all tendons, 1/s.
-        change: Cost per second of commands that change by 1 in each step, 1/s.
-    """
-
-    nearness: float = 50.0
-    effort: float = 1.0
-    change: float = 0.0
+    nearness: float = 50.0  # Reward at the target, 1/s.
+    effort: float = 1.0  # Cost of full tension of all tendons, 1/s.
+    change: float = 0.0  # Cost of commands that change by 1 in each step, 1/s.
 
     @classmethod
     def from_weights(cls, weights: Mapping[str, float]) -> FingertipReward:
-        """Create the reward from weights that replace the defaults.
-
-        Raises:
-            UnknownName: If the name of a weight is unknown.
-        """
-        names = [field.name for field in fields(cls)]
-        for name in weights:
-            if name not in names:
-                raise UnknownName("weight of the reward", name, names)
+        """Create the reward from weights that replace the defaults."""
+        require_known("weight of the reward", [one.name for one in fields(cls)], *weights)
         return cls(**{name: float(value) for name, value in weights.items()})
 
     def terms(self, distance: Any, effort: Any, change: Any, dt_s: float) -> dict[str, Any]:
         """Return the terms of one step, as numbers, arrays or tensors; the reward is their sum.
 
-        Args:
-            distance: Distance of the fingertip from its target, m, at least 0.
-            effort: Mean square of the tensions relative to their maxima, 0 to 1.
-            change: Mean square of the changes of the commands, 0 to 4.
-            dt_s: Duration of the step, s.
-
-        Returns:
-            `reward_nearness`, above 0 and at most `nearness * dt_s`; `reward_effort` and
-            `reward_change`, at most 0.
+        `distance` is the distance of the fingertip from its target, m; `effort` the mean square of
+        the tensions relative to their maxima, 0 to 1; `change` the mean square of the changes of
+        the commands, 0 to 4.
         """
         near = 0.5 / (1.0 + distance / _FAR_M) + 0.5 / (1.0 + distance / _NEAR_M)
         return {
@@ -146,23 +127,14 @@ class FingertipReward:
 
 @dataclass(frozen=True, slots=True)
 class FingerSenses:
-    """Measurements of a finger at one time.
+    """Measurements of a finger at one time."""
 
-    Attributes:
-        angles: Joint angles, rad, (4,).
-        velocities: Joint velocities, rad/s, (4,).
-        tensions: Tendon tensions, N, (7,).
-        lengths: Tendon lengths at their motors, relative to the straight finger, m, (7,).
-        commands: The newest command, -1 to 1, (7,).
-        fingertip: Position of the fingertip computed from `angles`, m, (3,).
-    """
-
-    angles: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    tensions: NDArray[np.float64]
-    lengths: NDArray[np.float64]
-    commands: NDArray[np.float64]
-    fingertip: NDArray[np.float64]
+    angles: NDArray[np.float64]  # Joint angles, rad, (4,).
+    velocities: NDArray[np.float64]  # Joint velocities, rad/s, (4,).
+    tensions: NDArray[np.float64]  # Tendon tensions, N, (7,).
+    lengths: NDArray[np.float64]  # Lengths at the motors, relative to the straight finger, m, (7,).
+    commands: NDArray[np.float64]  # The newest command, -1 to 1, (7,).
+    fingertip: NDArray[np.float64]  # Position computed from `angles`, m, (3,).
 
     def numbers(self) -> NDArray[np.float64]:
         """Return all numbers, (32,), in the order of `features_of_senses`."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog, lsq_linear, nnls
 
-from shapechanger.errors import UnknownName
+from shapechanger.errors import require_known
 from shapechanger.finger.anatomy import (
     JOINT_RANGE,
     JOINT_REST,
@@ -28,7 +28,7 @@ from shapechanger.finger.parameters import FingerParameters
 # as on the ascending limb of the force-length curve. The damping is chosen.
 _MUSCLE_STIFFNESS: Final = 25.0
 _MUSCLE_DAMPING: Final = 1.0
-# Least strength of a shortened muscle that is assumed to compute its command.
+# Smallest strength of a shortened muscle for which a command is computed.
 _WEAKEST: Final = 0.05
 # Chosen gains of a servo that holds its spool: 20 N per centimetre, nearly its largest force.
 _SERVO_STIFFNESS: Final = 2000.0
@@ -42,23 +42,15 @@ class TendonDrive:
     tension = (`offset` + `gain` u) (1 + `muscle_stiffness` (l - `rest`) + `muscle_damping` dl/dt)
     + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1, and the tendon's length l, m,
     relative to the straight finger. The arrays may be tensors.
-
-    Attributes:
-        offset: Tension at rest, N, (7,).
-        gain: Tension per command, N, (7,), > 0.
-        stiffness: Stiffness, N/m.
-        damping: Damping, N·s/m.
-        muscle_stiffness: Stiffness divided by tension, 1/m.
-        muscle_damping: Damping divided by tension, s/m.
-        rest: Length of each tendon at which a muscle has the tension of its command, m, (7,).
     """
 
-    offset: NDArray[np.float64]
-    gain: NDArray[np.float64]
-    stiffness: float = 0.0
-    damping: float = 0.0
-    muscle_stiffness: float = 0.0
-    muscle_damping: float = 0.0
+    offset: NDArray[np.float64]  # Tension at rest, N, (7,).
+    gain: NDArray[np.float64]  # Tension per command, N, (7,), > 0.
+    stiffness: float = 0.0  # N/m.
+    damping: float = 0.0  # N·s/m.
+    muscle_stiffness: float = 0.0  # Stiffness divided by tension, 1/m.
+    muscle_damping: float = 0.0  # Damping divided by tension, s/m.
+    # Length of each tendon at which a muscle has the tension of its command, m, (7,).
     rest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(TENDONS)))
 
     def tension(
@@ -79,7 +71,7 @@ class TendonDrive:
         The command may be outside of -1 to 1.
         """
         pulled = self.stiffness * length + self.damping * speed
-        # No command makes a very short muscle pull, so its strength is at least `_WEAKEST`.
+        # A very short muscle has no strength, so a least one is assumed.
         strength = self._strength(length, speed).clip(_WEAKEST)
         return ((tension - pulled) / strength - self.offset) / self.gain
 
@@ -93,25 +85,20 @@ class TendonDrive:
 
 DRIVES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "impedance": "a muscle: the command pulls, and the more it pulls the stiffer it is",
+        "impedance": "a muscle: the command sets its tension, which grows with its length",
         "tension": "a tension: -1 is the least, 1 the most",
-        "length": "a length: -1 is the longest, 1 the shortest, held as a servo holds it",
+        "length": "a length: -1 is the longest, 1 the shortest, held as by a servo",
     }
 )
 """Modes of action, and the meaning of a command in each."""
 
 
 def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
-    """Make the drive of a mode of action.
+    """Return the drive of a mode of action, with the finger's range of tensions.
 
-    A drive is part of the controller: it uses the finger's range of tensions, but the nominal
-    moment arms.
-
-    Raises:
-        UnknownName: If the mode is unknown.
+    A drive is part of the controller, so it assumes the nominal moment arms.
     """
-    if mode not in DRIVES:
-        raise UnknownName("mode of action", str(mode), DRIVES)
+    require_known("mode of action", DRIVES, mode)
     most = np.array(parameters.most_tension)
     if mode == "length":
         # The largest and smallest length of each tendon, from the ends of the joints' ranges.

@@ -33,9 +33,6 @@ def rig_place(profile: Profile, gap: str = "", seed: int | None = None) -> Place
 
     The finger is drawn from the named reality gap, by default with seed 0. Without a gap, it is the
     nominal finger.
-
-    Raises:
-        RobotError: If a gap is given for another robot.
     """
     tendons = {output.name for output in profile.outputs if output.driver == "bus_servo"}
     if tendons == set(TENDONS):
@@ -57,19 +54,13 @@ def finger_place(parameters: FingerParameters) -> Place:
 def open_finger(
     parts: Collection[str], camera: CameraPlan | None, seed: int, *, parameters: str
 ) -> FingerWorld:
-    """Open the world of a finger with these parameters, JSON; it has no sensors and no camera.
-
-    Raises:
-        FingerError: If the parameters are invalid.
-    """
+    """Open the world of a finger with these parameters, JSON; it has no sensors and no camera."""
     del parts, camera
     return FingerWorld(FingerParameters.from_json(parameters), seed)
 
 
 class FingerWorld(World):
-    """Bones and joints of a finger; see `World` and `TendonWorld`.
-
-    It has no surroundings and no other sensors.
+    """Bones and joints of a finger, without surroundings; see `World` and `TendonWorld`.
 
     The twin simulates servos with motors, spools, gears, cables and friction. Friction, mass, lag
     and delay of the parameters are therefore not simulated here. Readings of angles have the joint

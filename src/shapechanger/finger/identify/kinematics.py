@@ -51,23 +51,14 @@ _UNITS: Final = np.array([1e-3] * (_N_ARMS + _N_TENDONS) + [1e-4, 1e-4, 1e-3])
 
 @dataclass(frozen=True, slots=True)
 class Kinematics:
-    """Moment arms and stretch of a finger, with their standard errors.
+    """Moment arms and stretch of a finger, with their standard errors."""
 
-    Attributes:
-        arms: Moment arms, m, (7, 4).
-        arms_sd: Standard errors of the arms, m, (7, 4); 0 if a tendon does not cross a joint.
-        compliance: Stretch per newton, m/N; near 0 for stiff tendons.
-        compliance_sd: Standard error of `compliance`, m/N.
-        joint_noise: Standard deviation of measured angles, rad, (4,).
-        angles: Estimates of the true angles, rad, (n, 4).
-    """
-
-    arms: NDArray[np.float64]
-    arms_sd: NDArray[np.float64]
-    compliance: float
+    arms: NDArray[np.float64]  # Moment arms, m, (7, 4).
+    arms_sd: NDArray[np.float64]  # m, (7, 4); 0 if a tendon does not cross a joint.
+    compliance: float  # Stretch per newton, m/N; near 0 for stiff tendons.
     compliance_sd: float
-    joint_noise: NDArray[np.float64]
-    angles: NDArray[np.float64]
+    joint_noise: NDArray[np.float64]  # Standard deviation of measured angles, rad, (4,).
+    angles: NDArray[np.float64]  # Estimates of the true angles, rad, (n, 4).
 
 
 def fit_kinematics(log: FingerLog) -> Kinematics:
@@ -81,7 +72,6 @@ def fit_kinematics(log: FingerLog) -> Kinematics:
     for _ in range(_ROUNDS):
         length_noise = settled.length_noise(x)
         variance = settled.variance(x, noise, length_noise)
-
         arguments = settled, noise, variance
         solved = cast("Any", least_squares(_whitened, x, x_scale="jac", max_nfev=8, args=arguments))
         x = np.asarray(solved.x, np.float64)
@@ -126,9 +116,8 @@ def robust_covariance(
 def interval_quantile(times: int, control_dt: float) -> float:
     """Half width of a 95 % interval, in standard errors of `robust_covariance`.
 
-    The quantile is above 1.96, because the covariance is estimated from few periods of half a
-    second. It is the cubic of Kiefer & Vogelsang 2005 (Econometric Theory 21:1130, table 1,
-    Bartlett's weights).
+    It is above 1.96, because the covariance is estimated from few periods of half a second, by the
+    cubic of Kiefer & Vogelsang 2005 (Econometric Theory 21:1130, table 1, Bartlett's weights).
     """
     b = min(1.0, _lags(control_dt) / times)
     return float(np.polyval([-0.5324, 0.4160, 2.9694, 1.9600], b))
@@ -136,17 +125,13 @@ def interval_quantile(times: int, control_dt: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Regression:
-    """Columns of the regression, one row per time.
-
-    `speeds` are rates of the lengths, m/s, (n, 7). `directions` are smoothed signs of the speeds,
-    -1 to 1, (n, 7).
-    """
+    """Columns of the regression, one row per time."""
 
     lengths: NDArray[np.float64]
     angles: NDArray[np.float64]
     tensions: NDArray[np.float64]
-    speeds: NDArray[np.float64]
-    directions: NDArray[np.float64]
+    speeds: NDArray[np.float64]  # Rates of the lengths, m/s, (n, 7).
+    directions: NDArray[np.float64]  # Smoothed signs of the speeds, -1 to 1, (n, 7).
 
     @classmethod
     def of(cls, log: FingerLog, first: int = 0) -> _Regression:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import layouts_of
-from shapechanger.errors import FingerError, OutputError, UnknownName
+from shapechanger.errors import FingerError, OutputError, require_known
 from shapechanger.files import read_file
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.controller import FingerBabble, places_of
@@ -81,8 +81,7 @@ class FingerLog:
     motors: FingerParameters | None = None
 
     def __post_init__(self) -> None:
-        if self.actions not in DRIVES:
-            raise UnknownName("mode of action", self.actions, DRIVES)
+        require_known("mode of action", DRIVES, self.actions)
         if not 0.0 < self.control_dt < float("inf"):
             raise FingerError(f"control_dt must be above 0 s and finite, got {self.control_dt}.")
         for name, row in SIGNALS.items():
@@ -112,11 +111,7 @@ class FingerLog:
 
 
 def require_informative(log: FingerLog) -> None:
-    """Check that every joint moves far enough and independently of the others.
-
-    Raises:
-        FingerError: If the log is too short, or a joint hardly moves or moves only with others.
-    """
+    """Raise a FingerError unless the log is long enough and each joint moves on its own."""
     if log.seconds < _SHORTEST_S - 0.5 * log.control_dt:
         raise FingerError(
             f"The log is {log.seconds:.1f} s long; identification needs at least "
@@ -155,15 +150,7 @@ class _Header(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
-    """Write a log to a file, replacing an existing one.
-
-    Args:
-        log: The log.
-        path: File to write; no suffix is added.
-
-    Raises:
-        OutputError: If the file cannot be written.
-    """
+    """Write a log to a file, replacing an existing one; no suffix is added to the path."""
     own: dict[str, Any] = {key: getattr(log, key) for key in _SETTINGS}
     header = _Header(
         format="shapechanger finger log", version=1, joints=JOINTS, tendons=TENDONS, **own
@@ -216,16 +203,8 @@ def record_babble(
 ) -> FingerLog:
     """Record a log of a finger that `FingerBabble` moves.
 
-    Args:
-        env: Env with the layout of a finger, simulated or on a rig, without a time limit.
-        seconds: Duration, s.
-        seed: Seed of the motions and of the env.
-        actions: Meaning of an action of the env.
-
-    Raises:
-        LayoutError: If the env publishes no layouts.
-        UnknownName: If the env's layout is not a finger's.
-        FingerError: If the env's observations are not a vector, or the episode ends too early.
+    The env is a finger, simulated or on a rig, without a time limit, in which actions have the
+    meaning `actions`. A FingerError is raised if the episode ends too early.
     """
     if not isinstance(env.observation_space, gym.spaces.Box):
         raise FingerError("Recording a finger needs Box observations: omit `goal`.")

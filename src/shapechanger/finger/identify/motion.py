@@ -84,24 +84,14 @@ class CommandSignal:
 
 @dataclass(frozen=True, slots=True)
 class Motors:
-    """Lag, delay and strength of a finger's motors.
+    """Lag, delay and strength of a finger's motors."""
 
-    Attributes:
-        lag: Time constant between a command and its force, s.
-        delay: Delay of the commands, s.
-        strength: Largest tensions, divided by the largest tensions of the finger assumed in the
-            fit.
-        sd: Standard errors of `lag`, `delay` and `strength`.
-        saturates: Whether a tendon reached its largest tension, so that `strength` is an estimate.
-        tension_noise: Standard deviation of measured tensions, N.
-    """
-
-    lag: float
-    delay: float
-    strength: float
-    sd: tuple[float, float, float]
-    saturates: bool
-    tension_noise: float
+    lag: float  # Time constant between a command and its force, s.
+    delay: float  # Delay of the commands, s.
+    strength: float  # Largest tensions, divided by the tensions assumed in the fit.
+    sd: tuple[float, float, float]  # Standard errors of `lag`, `delay` and `strength`.
+    saturates: bool  # Whether a tendon reached its largest tension; otherwise the strength is 1.
+    tension_noise: float  # Standard deviation of measured tensions, N.
 
 
 def fit_motors(log: FingerLog) -> Motors:
@@ -192,19 +182,12 @@ _TOLERANCE: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Part of a log, and the state at its start.
+    """Part of a log, and the state at its start."""
 
-    Attributes:
-        start: Time of the first row, s.
-        angles: Angles at the start and at the end of each control period, rad, (m + 1, 4).
-        velocities: Angular velocities at the start, rad/s, (4,).
-        activations: Activations of the motors at the start, -1 to 1, (7,).
-    """
-
-    start: float
-    angles: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    activations: NDArray[np.float64]
+    start: float  # Time of the first row, s.
+    angles: NDArray[np.float64]  # At the start and after each control period, rad, (m + 1, 4).
+    velocities: NDArray[np.float64]  # Angular velocities at the start, rad/s, (4,).
+    activations: NDArray[np.float64]  # Activations of the motors at the start, -1 to 1, (7,).
 
 
 def cut_windows(
@@ -263,9 +246,6 @@ def fit_dynamics(
 
     Returns each value, in SI units, and the standard error of its logarithm, keyed by the names of
     `FACTORS`. The standard errors assume that the model is right.
-
-    Raises:
-        MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
     """
     sysid: Any = importlib.import_module("mujoco.sysid")  # The module has no type annotations.
     # If its dependencies are missing, the module can be imported, but is empty.

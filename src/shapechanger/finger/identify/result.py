@@ -102,8 +102,7 @@ class HeldOut:
 
     t: NDArray[np.float64]  # Time since the start of the log, s, (n,).
     measured: NDArray[np.float64]  # Measured angles, rad, (n, 4).
-    # Angles of the identified finger under the same commands, rad, (n, 4).
-    identified: NDArray[np.float64]
+    identified: NDArray[np.float64]  # Angles of the identified finger, rad, (n, 4).
     nominal: NDArray[np.float64]  # Angles of the nominal finger, rad, (n, 4).
 
     @property
@@ -116,23 +115,14 @@ class HeldOut:
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedFinger:
-    """Result of `identify`.
+    """Result of `identify`."""
 
-    Attributes:
-        parameters: The finger, for `build_finger` or the env's argument `parameters`.
-        estimates: Identified parameters with intervals, the moment arms first.
-        undetermined: Names of parameters that the log cannot determine, each with the reason.
-        held_out: Validation on the part of the log that was not fitted.
-        source: Source named in the log.
-        seconds: Length of the log, s.
-    """
-
-    parameters: FingerParameters
-    estimates: tuple[ParameterEstimate, ...]
-    undetermined: tuple[tuple[str, str], ...]
+    parameters: FingerParameters  # The finger, for the env's argument `parameters`.
+    estimates: tuple[ParameterEstimate, ...]  # Identified parameters, the moment arms first.
+    undetermined: tuple[tuple[str, str], ...]  # Names of other parameters, each with the reason.
     held_out: HeldOut
-    source: str
-    seconds: float
+    source: str  # Source named in the log.
+    seconds: float  # Length of the log, s.
 
     @property
     def arms(self) -> tuple[ParameterEstimate, ...]:
@@ -149,10 +139,7 @@ class IdentifiedFinger:
         return ends
 
 
-def identify(
-    log: FingerLog,
-    progress: Callable[[str], None] = lambda _: None,
-) -> IdentifiedFinger:
+def identify(log: FingerLog, progress: Callable[[str], None] = lambda _: None) -> IdentifiedFinger:
     """Estimate the parameters of a finger from a log.
 
     Arms and stretch are estimated from the lengths, angles and tensions of the whole log, and
@@ -160,14 +147,9 @@ def identify(
     four fifths of the motion by `mujoco.sysid`. The last fifth is simulated for validation. On the
     path of a rig, tensions do not show delays below a period, so the motion determines the delay.
 
-    Args:
-        log: A log, such as of ten seconds, in which each joint moves through much of its range
-            under varying tensions.
-        progress: Called with the name of each step before it starts.
-
-    Raises:
-        FingerError: If the log is too short, or a joint hardly moves or moves only with others.
-        MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
+    In a log of, for example, ten seconds, each joint must move through much of its range under
+    varying tensions. `progress` is called with the name of each step before it starts. Raises a
+    FingerError if the log is too short, or a joint hardly moves or moves only with others.
     """
     require_informative(log)
     progress("arms and stretch, from lengths")
@@ -306,7 +288,7 @@ def _parameters(
     dynamics: Mapping[str, tuple[float, float]],
     known: FingerParameters | None,
 ) -> FingerParameters:
-    """The identified finger; parameters that cannot be determined are known or nominal."""
+    """The identified finger, in which undetermined parameters are the known or nominal ones."""
     noise = float(np.sqrt(np.mean(kinematics.joint_noise**2)))
     plain = with_motors(motors, known)
     if known is not None and known.path is not None:

@@ -13,7 +13,7 @@ from typing import Final
 import msgspec
 import mujoco
 
-from shapechanger.errors import ProfileError, UnknownName
+from shapechanger.errors import ProfileError, require_known
 from shapechanger.vehicles.bodies.model import BoundVehicle, Floating, Rolling
 from shapechanger.vehicles.bodies.parts import (
     HOBBY_MOTOR,
@@ -72,8 +72,7 @@ VEHICLES: Final[Mapping[str, VehicleModel]] = MappingProxyType(
 
 def vehicle_model(name: str) -> VehicleModel:
     """Find a vehicle model by name."""
-    if name not in VEHICLES:
-        raise UnknownName("vehicle", name, VEHICLES)
+    require_known("vehicle", VEHICLES, name)
     return VEHICLES[name]
 
 

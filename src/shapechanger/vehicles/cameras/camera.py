@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.envs.opengl import choose_gl, open_context
-from shapechanger.errors import RenderError, UnknownName
+from shapechanger.errors import RenderError, require_known
 from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
 
 _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
@@ -223,8 +223,7 @@ CORRUPTIONS: Final[Mapping[str, Corruption]] = MappingProxyType(
 
 def find_corruption(name: str) -> Corruption:
     """Find a camera fault by name."""
-    if name not in CORRUPTIONS:
-        raise UnknownName("lens", name, CORRUPTIONS)
+    require_known("lens", CORRUPTIONS, name)
     return CORRUPTIONS[name]
 
 

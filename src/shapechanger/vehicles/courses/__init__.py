@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
-from shapechanger.errors import UnknownName, WorldError
+from shapechanger.errors import WorldError, require_known
 from shapechanger.vehicles.courses.course import FLOODED, Course
 from shapechanger.vehicles.courses.geometry import distances_from_obstacle, turn_angles
 from shapechanger.vehicles.courses.layouts import corridor, open_course
@@ -25,8 +25,7 @@ def lay_out(world: str, seed: int) -> Course:
     """Lay out the course of a seed, >= 0, in one of `WORLDS`; it is the same on every machine."""
     if world == FLOODED:
         return dataclasses.replace(lay_out("corridor", seed), world=world)
-    if world not in WORLDS:
-        raise UnknownName("world", world, WORLDS)
+    require_known("world", WORLDS, world)
     if seed < 0:
         raise WorldError(f"The seed of a course must be at least 0, got {seed}.")
     rng = np.random.default_rng([zlib.crc32(world.encode()), seed])

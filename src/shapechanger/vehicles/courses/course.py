@@ -10,7 +10,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import UnknownName, WorldError
+from shapechanger.errors import WorldError, require_known
 
 TRAINING: Final = range(0, 1_000_000)
 """Seeds of the courses for training."""
@@ -156,8 +156,7 @@ class Look:
     @staticmethod
     def of(world: str) -> Look:
         """Usual look of a world."""
-        if world not in LOOKS:
-            raise UnknownName("world", world, LOOKS)
+        require_known("world", LOOKS, world)
         return LOOKS[world]
 
     @staticmethod

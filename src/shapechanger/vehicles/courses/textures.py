@@ -13,7 +13,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shapechanger.errors import UnknownName
+from shapechanger.errors import require_known
 
 Field = NDArray[np.floating[Any]]
 """Image, (H, W, 3), or one channel, (H, W); large ones have single precision."""
@@ -399,8 +399,7 @@ PAINTERS: Final[Mapping[str, Callable[[np.random.Generator], Field]]] = MappingP
 @functools.lru_cache(400)  # A set has at most ten textures, and each world a dozen sets.
 def texture(name: str, seed: int) -> NDArray[np.uint8]:
     """Paint a texture, read-only, (H, W, 3), with the top row first, or take it from the cache."""
-    if name not in PAINTERS:
-        raise UnknownName("texture", name, PAINTERS)
+    require_known("texture", PAINTERS, name)
     rng = np.random.default_rng([seed, crc32(name.encode())])
     image = np.clip(PAINTERS[name](rng), 0.0, 1.0)
     result = (image * 255.0 + 0.5).astype(np.uint8)

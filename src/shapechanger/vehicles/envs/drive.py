@@ -24,9 +24,9 @@ from shapechanger.errors import (
     ProfileError,
     RenderError,
     SpaceMismatch,
-    UnknownName,
     WorldError,
     check_seed,
+    require_known,
 )
 from shapechanger.layout import Layout
 from shapechanger.registry import ROBOTS
@@ -93,8 +93,7 @@ def simulated_robot(
     if names != ["steering", "throttle"]:
         raise ProfileError(f"{found.path}: actions must be steering and throttle, not {names}.")
     if steering is not None:
-        if steering not in _LEVELS:
-            raise UnknownName("steering", steering, _LEVELS)
+        require_known("steering", _LEVELS, steering)
         turning = dataclasses.replace(plan.actions[0], levels=_LEVELS[steering])
         plan = dataclasses.replace(plan, actions=(turning, *plan.actions[1:]))
     require_fit(vehicle, {output.part for output in plan.outputs})
@@ -120,8 +119,7 @@ _OPTIONS: Final = ("course", "start")
 def _course_seeds(courses: Courses) -> Sequence[int]:
     """Return the seeds of the courses to sample from."""
     if isinstance(courses, str):
-        if courses not in _KINDS:
-            raise UnknownName("kind of courses", courses, _KINDS)
+        require_known("kind of courses", _KINDS, courses)
         return _KINDS[courses]
     given: Any = courses  # May also be a single seed.
     seeds = tuple(_seed_of("course", seed) for seed in np.atleast_1d(np.array(given, object)))
@@ -164,8 +162,8 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         render_mode: str | None = None,
     ) -> None:
         """Open the world; see `VehicleEnv` for the arguments."""
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise UnknownName("render mode", render_mode, self.metadata["render_modes"])
+        if render_mode is not None:
+            require_known("render mode", self.metadata["render_modes"], render_mode)
         self.render_mode, self._puts_back = render_mode, put_back
         self._seeds, self._randomise = _course_seeds(courses), randomise
         self.world = MujocoWorld(
@@ -202,9 +200,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """
         super().reset(seed=seed)
         options = options or {}
-        for name in options:
-            if name not in _OPTIONS:
-                raise UnknownName("option of reset", name, _OPTIONS)
+        require_known("option of reset", _OPTIONS, *options)
         world, rng = self.world, self.np_random
         # Given options are drawn, too, so that other draws do not depend on them.
         course = self._seeds[int(rng.integers(len(self._seeds)))]
