@@ -1,4 +1,4 @@
-"""Results and scores of drives."""
+"""Results and scores of drives in the driving benchmark."""
 
 from contextlib import closing
 
@@ -15,7 +15,7 @@ from shapechanger.vehicles.envs import VehicleEnv
     # limits of a Poisson variable for 1 - 2a = 0.95.
     [(0, 0.0, 3.69), (1, 0.0253, 5.57), (10, 4.80, 18.39), (50, 37.11, 65.92)],
 )
-def test_the_interval_agrees_with_tables(count: int, low: float, high: float) -> None:
+def test_poisson_intervals_agree_with_tables(count: int, low: float, high: float) -> None:
     assert poisson_interval(count) == pytest.approx((low, high), abs=0.006)
 
 
@@ -29,8 +29,8 @@ def test_scores_are_ratios_of_sums() -> None:
     assert (score.low, score.high) == pytest.approx((0.242 / 0.4, 7.22 / 0.4), abs=0.02)
 
 
-def test_the_expert_reaches_the_distance() -> None:
-    """The drive ends there, without collisions."""
+def test_a_drive_ends_at_its_distance() -> None:
+    """The expert drives 5 m without collisions."""
     with closing(VehicleEnv("car", image=False, put_back=True)) as car:
         done = drive(car, car.expert(), course=HELD_OUT[0], metres=5.0)
     assert (done.reached, done.collisions, done.course) == (True, 0, HELD_OUT[0])

@@ -17,16 +17,9 @@ from shapechanger.vehicles.cloning import STUDENT_CLONING, train_student
 
 _CAR = EnvRef("shapechanger/Car-v1", {"put_back": True})
 _TINY = PpoSettings(
-    n_envs=1,
-    n_steps=8,
-    batch_size=8,
-    n_epochs=1,
-    learning_rate=1e-3,
-    steps=8,
-    eval_every=8,
-    eval_episodes=1,
-    normalise=True,
-)
+    n_envs=1, n_steps=8, batch_size=8, n_epochs=1, learning_rate=1e-3, steps=8, eval_every=8,
+    eval_episodes=1, normalise=True,
+)  # fmt: skip
 
 
 def _teacher(vehicle: str = "Car") -> TrainedPolicy:
@@ -42,8 +35,8 @@ def teacher() -> TrainedPolicy:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_a_student_sees_images_only(teacher: TrainedPolicy, tmp_path: Path) -> None:
-    """The card names the teacher, and the student acts like it."""
+def test_a_student_learns_from_images(teacher: TrainedPolicy, tmp_path: Path) -> None:
+    """The saved policy acts on images, and its card names the teacher's env."""
     quick = msgspec.structs.replace(STUDENT_CLONING, fewest_steps=20, most_steps=20)
     done: list[int] = []
     policy = train_student(_CAR, teacher, 24, 3, settings=quick, on_steps=done.append)
@@ -60,13 +53,13 @@ def test_a_student_sees_images_only(teacher: TrainedPolicy, tmp_path: Path) -> N
 
 def test_unsuitable_teachers_are_refused(teacher: TrainedPolicy) -> None:
     """Policies of other envs, envs without teachers and too few steps are refused."""
-    for env, steps, who, text in (
+    for env, steps, given, text in (
         (_CAR, 10, _teacher("Tank"), "A teacher for shapechanger/Car-v1 is a policy of"),
         (EnvRef("shapechanger/CarRanges-v1"), 10, teacher, "CarRanges-v1 has no teachers"),
         (_CAR, 2, teacher, "at least 3 steps, got 2"),
     ):
         with pytest.raises(StudyError, match=text):
-            train_student(env, who, steps, 0)
+            train_student(env, given, steps, 0)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +69,7 @@ def test_unsuitable_teachers_are_refused(teacher: TrainedPolicy) -> None:
         (f"--teacher {__file__} --learner cloning", "--teacher excludes --learner"),
     ],
 )
-def test_unsuitable_arguments_are_refused_before_the_training(
+def test_unsuitable_arguments_of_train_are_refused(
     arguments: str, sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):

@@ -1,4 +1,4 @@
-"""The env of a vehicle next to its whole robot: guard, drivers and simulated chips."""
+"""The env of a vehicle compared with a whole simulated robot: guard, drivers and chips."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,7 @@ _COURSE, _START = 5, 3
 def _side_by_side(
     env: VehicleEnv, act: Callable[[Any], NDArray[np.float32]], metres: float, steps: int
 ) -> dict[str, float]:
-    """Drive both with the same actions, and return the largest differences."""
+    """Drive the env and a whole robot with the same actions; return the largest differences."""
     vehicle = env.world.vehicle.name
     profile = load_profile(find_profile(f"lab-{vehicle}"))
     far = {"place": 0.0}
@@ -54,21 +54,21 @@ def _side_by_side(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("vehicle", HOME)
-def test_after_100_m_the_whole_robot_is_at_the_same_place(vehicle: str) -> None:
-    """Over 100 m, places agree within 2 cm, and collisions are equal."""
+def test_positions_agree_with_the_whole_robot_over_100_m(vehicle: str) -> None:
+    """Positions agree within 2 cm, and collisions are equal."""
     with closing(VehicleEnv(vehicle, image=False, put_back=True)) as env:
         assert _side_by_side(env, env.expert(), 100.0, 6000)["place"] < 0.02
         assert env.world.progress_m >= 100.0
 
 
 @pytest.mark.parametrize("vehicle", HOME)
-def test_sensors_and_reflexes_are_those_of_the_whole_robot(vehicle: str) -> None:
-    """While a vehicle drives into walls and back, readings, stops and their durations agree."""
+def test_sensors_and_reflexes_agree_with_the_whole_robot(vehicle: str) -> None:
+    """Readings and reasons of stops agree while a vehicle drives into walls and back."""
     ways = np.array([(-0.6, 0.8), (0.9, 0.7), (0.3, -0.6)], np.float32)
     drawn = iter(np.repeat(np.tile(ways, (4, 1)), 20, axis=0))
     with closing(VehicleEnv(vehicle, image=False, put_back=True)) as env:
         far = _side_by_side(env, lambda _: next(drawn), 100.0, 160)
     assert far.pop("collisions") >= (0 if vehicle == "boat" else 1)
-    assert far.pop("battery") < 0.5  # Both read it ten times a second, not at the same time.
+    assert far.pop("battery") < 0.5  # Volts; the two are read at different times.
     assert far.pop("place") < 1e-6
     assert all(difference < 0.03 for difference in far.values()), far

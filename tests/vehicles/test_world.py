@@ -16,13 +16,10 @@ from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
 from shapechanger.vehicles.bodies.parts import CameraJitter
 from shapechanger.vehicles.courses.course import Look
 from shapechanger.vehicles.world import MujocoWorld
+from tests.vehicles.bodies.grounds import AHEAD
 
-_AHEAD: Mapping[str, Mapping[str, float]] = {
-    "car": {"wheels": 0.5, "steering": 0.0},
-    "truck": {"wheels": 0.5, "steering": 0.0},
-    "tank": {"left track": 0.5, "right track": 0.5},
-    "boat": {"propeller": 0.5, "rudder": 0.0},
-}
+# Outputs for half the speed ahead.
+_AHEAD = {name: {part: 0.5 * v for part, v in full.items()} for name, full in AHEAD.items()}
 _EACH = pytest.mark.parametrize("vehicle", VEHICLES)
 
 
@@ -36,10 +33,8 @@ def _drive(world: MujocoWorld, outputs: Mapping[str, float | None], seconds: flo
 
 
 @_EACH
-def test_poses_that_are_computed_once_change_no_drive(
-    vehicle: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With MuJoCo's sleep flag, a drive into a wall and the poses of images keep every bit."""
+def test_sleep_changes_no_drive(vehicle: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With MuJoCo's sleep flag, states and geom poses of a drive into a wall are bit-identical."""
     states: list[tuple[bytes, ...]] = []
     world = _world(vehicle)
     assert world.model.opt.enableflags == mujoco.mjtEnableBit.mjENBL_SLEEP
@@ -51,17 +46,17 @@ def test_poses_that_are_computed_once_change_no_drive(
         data = world.data
         states.append(tuple(x.tobytes() for x in (data.qpos, data.qvel, data.geom_xpos)))
         world.put(world.pose)
-        _drive(world, {}, 30.0)  # At rest: it would fall asleep.
+        _drive(world, {}, 30.0)  # After this time at rest, other bodies sleep.
         _drive(world, _AHEAD[vehicle], 0.1)
         states[-1] += (world.data.qpos.tobytes(),)
     assert states[0] == states[1]
 
 
 @_EACH
-def test_wheels_that_meet_only_the_ground_change_no_drive(
+def test_a_coarse_world_with_fine_steps_is_identical(
     vehicle: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Until it hits a wall with its hull, a coarse world of equal steps is bit for bit the same."""
+    """Until the hull hits a wall, poses do not depend on contacts of wheels with walls."""
     monkeypatch.setattr(world_module, "_COARSE_DT", SIM_DT)
     poses: list[Pose] = []
     for coarse in (False, True):
@@ -85,8 +80,8 @@ def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
     return Pose(float(x), float(y), math.atan2(-along[0], along[1]))
 
 
-def test_the_time_step_of_calls_does_not_matter() -> None:
-    """The remainder of a step is carried over to the next call."""
+def test_advance_accepts_any_duration() -> None:
+    """The remainder of a simulation step is added to the next call."""
     worlds = []
     for factor in (1.0 / 3.0, 1.0, 10.0):
         worlds.append(_world())
@@ -98,8 +93,8 @@ def test_the_time_step_of_calls_does_not_matter() -> None:
     assert cut.data.time == pytest.approx(100 * SIM_DT)
 
 
-def test_running_into_a_wall_is_one_collision_and_put_back_frees_the_vehicle() -> None:
-    """A crash stops the car and presses the bumper; collisions and progress are kept."""
+def test_put_back_after_a_collision() -> None:
+    """A wall stops the car and presses its bumper; `put_back` keeps collisions and progress."""
     world = _world()
     world.put(_before_a_wall(world, 0.7))
     assert world.distance_m() == pytest.approx(0.7 - world.vehicle.nose_m, abs=0.005)

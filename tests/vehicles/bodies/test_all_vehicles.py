@@ -6,15 +6,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
+from shapechanger.vehicles.bodies import SIM_DT, VEHICLES, add_vehicle
 from shapechanger.vehicles.bodies.parts import BATTERY_V
 from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
 from tests.vehicles.bodies.grounds import AHEAD, ALL, LAND, TO_THE_LEFT, ground
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_vehicle_at_rest_stays(name: str) -> None:
-    """The vehicle creeps by less than 0.1 mm in ten seconds."""
+def test_a_vehicle_stays_at_rest(name: str) -> None:
+    """The vehicle moves by less than 0.1 mm in ten seconds."""
     here = ground(name)
     here.drive(1.0, {})
     before = here.vehicle.motion()
@@ -68,8 +68,8 @@ def test_zero_brakes_and_none_coasts(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_stalled_motor_draws_the_most_current(name: str) -> None:
-    """The stall current is the winding's, and less flows at speed."""
+def test_a_stalled_motor_draws_the_largest_current(name: str) -> None:
+    """The resistance of the winding limits the stall current; at speed, less current flows."""
     here = ground(name)
     here.vehicle.drive(AHEAD[name], BATTERY_V)
     stalled = here.vehicle.current_a()
@@ -82,7 +82,7 @@ def test_a_stalled_motor_draws_the_most_current(name: str) -> None:
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("heading", [0.0, 0.6])
 def test_a_wall_stops_a_vehicle(name: str, heading: float) -> None:
-    """The vehicle neither climbs nor tips."""
+    """The vehicle neither climbs the wall nor tips over."""
     here = ground(name, wall_x=6.0)
     here.vehicle.place(0.0, 0.0, heading)
     most_height, least_upright, furthest = 0.0, 1.0, 0.0
@@ -126,7 +126,7 @@ def test_names_and_collision_bits(name: str) -> None:
         bits = (int(geom.contype[0]), int(geom.conaffinity[0]))
         assert bits in ((0, 0), (2, 1), (10, 5))
         drawn = (OWN_VIEW, OUTSIDE_VIEW)
-        assert int(geom.group[0]) in (drawn if bits == (0, 0) else (3,))  # 3 is not drawn.
+        assert int(geom.group[0]) in (drawn if bits == (0, 0) else (3,))  # Group 3 is hidden.
     kinds = (model.body, model.nbody), (model.joint, model.njnt), (model.actuator, model.nu)
     for element, count in kinds:
         assert all(element(i).name.startswith(("vehicle/", "world")) for i in range(count))
@@ -150,3 +150,25 @@ def test_the_size_is_as_declared(name: str) -> None:
         assert abs(place[1]) + reach[1] <= here.kind.width_m / 2 + 1e-6
         assert place[0] - reach[0] >= here.kind.nose_m - here.kind.length_m - 1e-6
     assert max(hits) == pytest.approx(here.kind.nose_m, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_visual_geoms_change_no_physics(name: str) -> None:
+    """Masses, inertias and collision geoms are the same without visual geoms."""
+    full, bare = mujoco.MjSpec(), mujoco.MjSpec()
+    for spec in (full, bare):
+        add_vehicle(spec, name)
+    for geom in list(bare.geoms):
+        if geom.group in (OWN_VIEW, OUTSIDE_VIEW):
+            assert geom.contype == geom.conaffinity == 0
+            assert geom.mass == 0.0
+            bare.delete(geom)
+    model, plain = full.compile(), bare.compile()
+    for field in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_M0"):
+        np.testing.assert_array_equal(getattr(model, field), getattr(plain, field), err_msg=field)
+    solid = (model.geom_contype | model.geom_conaffinity) > 0
+    assert solid.sum() == plain.ngeom
+    for field in ("type", "size", "pos", "quat", "friction", "solref", "solimp", "contype",
+                  "conaffinity", "bodyid", "priority"):  # fmt: skip
+        mine, theirs = getattr(model, f"geom_{field}")[solid], getattr(plain, f"geom_{field}")
+        np.testing.assert_array_equal(mine, theirs, err_msg=field)

@@ -1,4 +1,4 @@
-"""Each kind of vehicle: parts, motors, steering and motion; and the counting of collisions."""
+"""Parts, motors, steering and motion of each kind of vehicle, and the counting of collisions."""
 
 import math
 from collections.abc import Callable
@@ -29,7 +29,7 @@ def test_an_unknown_name_is_refused(make: Callable[[str], object]) -> None:
         ("boat", {"propeller", "left propeller", "right propeller"}, ", or by 'left propeller'"),
     ],
 )
-def test_robots_that_do_not_fit(name: str, parts: set[str], message: str) -> None:
+def test_robots_with_other_parts_are_refused(name: str, parts: set[str], message: str) -> None:
     with pytest.raises(ProfileError) as caught:
         require_fit(name, parts)
     assert message in str(caught.value)
@@ -60,7 +60,7 @@ def test_wheel_angles_satisfy_ackermann() -> None:
         float(here.data.joint(f"vehicle/{s} steering").qpos[0]) for s in ("left", "right")
     )
     assert left > right > 0.3
-    # Ackermann: the cotangents differ by gauge over wheelbase.
+    # Ackermann: the difference of the cotangents is the gauge divided by the wheelbase.
     assert 1 / math.tan(right) - 1 / math.tan(left) == pytest.approx(0.140 / 0.26, rel=0.02)
 
 
@@ -159,15 +159,15 @@ class _Bench:
         self.touch = ContactTracker(self.model)
 
     def stand(self, x: float, seconds: float = _DT, heading: float = 0.0) -> None:
-        """Stay at x for a while."""
+        """Stay at x for some seconds."""
         self.data.qpos[:3] = x, 0.0, 0.1
         mujoco.mj_forward(self.model, self.data)
         for _ in range(round(seconds / _DT)):
             self.touch.follow(self.data, Motion(x, 0.0, heading, 0.0, 0.0, 0.0), _DT)
 
 
-def test_a_wall_is_one_collision_also_when_it_is_left_for_a_moment() -> None:
-    """Contacts within 0.5 s are one collision, later ones another."""
+def test_contacts_within_half_a_second_are_one_collision() -> None:
+    """A later contact is another collision."""
     bench = _Bench()
     bench.stand(0.91, seconds=3.0)
     assert bench.touch.touches
@@ -182,9 +182,9 @@ def test_a_wall_is_one_collision_also_when_it_is_left_for_a_moment() -> None:
     ("off", "felt"), [(0.0, True), (0.9, True), (-0.9, True), (1.1, False), (math.pi, False)]
 )
 def test_the_bumper_is_at_the_front(off: float, felt: bool) -> None:
-    """Contacts at the side or rear are collisions without a bump.
+    """Contacts at the side or rear are collisions that do not press the bumper.
 
-    `off` is the bearing of the wall over `BUMPER_SPREAD`, or pi for behind.
+    `off` is the bearing of the wall divided by `BUMPER_SPREAD`, or pi for a wall behind.
     """
     bench = _Bench()
     bench.stand(0.91, heading=off if off == math.pi else off * BUMPER_SPREAD)

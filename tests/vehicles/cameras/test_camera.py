@@ -44,7 +44,7 @@ def _model(colour: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_cameras_render_their_models_in_turn() -> None:
-    """The image shows the geom ahead of the camera, in a new array, also of a new model."""
+    """Images are new arrays that show the geom ahead, also after a change of the model."""
     cameras = [OnboardCamera((32, 16), "eye"), OnboardCamera((16, 16), "eye")]
     for colours, brightest in ((("1 0 0", "0 0 1"), (0, 2)), (("0 1 0", "1 0 0"), (1, 0))):
         models = [_model(colour) for colour in colours]
@@ -60,7 +60,7 @@ def test_cameras_render_their_models_in_turn() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_an_unclosed_camera_frees_its_context() -> None:
-    """Garbage collection frees it, and `close` can be called twice and before an image."""
+    """Garbage collection frees the context; `close` can be called twice, and before an image."""
     model, data = _model("1 0 0")
     dropped: list[weakref.ref[OnboardCamera]] = []
     for _ in range(3):
@@ -84,7 +84,7 @@ def test_rendering_after_a_fork_raises(monkeypatch: pytest.MonkeyPatch) -> None:
         camera.picture(model, data)
 
 
-# Looks along x, with z up, as the cameras of vehicles.
+# A camera that looks along x, with z up, like the cameras of vehicles.
 _MOUNTED = """
 <mujoco><worldbody><body><geom size="0.1"/>
 <camera name="eye" pos="0.05 0 0.12" xyaxes="0 -1 0 0 0 1"/>
@@ -123,7 +123,7 @@ _ERRORS = st.one_of(st.floats(-2.0, 2.0), st.floats())
 @example(jitter=CameraJitter(left_m=-1.5))
 @example(jitter=CameraJitter(roll_rad=math.nan))
 def test_a_camera_stays_on_its_vehicle(jitter: CameraJitter) -> None:
-    """An error of the pose is added completely, or refused and changes nothing."""
+    """An error of the pose is added completely, or refused without any change."""
     model = mujoco.MjModel.from_xml_string(_MOUNTED)
     before = model.cam_pos.copy(), model.cam_quat.copy()
     numbers = dataclasses.astuple(jitter)

@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
 @contextmanager
 def _invisible(world: MujocoWorld) -> Iterator[None]:
-    """Hide what is seen of the vehicle from outside; compiled models are shared and cached."""
+    """Hide the vehicle in outside views; the model is shared, so it is restored."""
     model = world.model
     hidden = model.geom_group == OUTSIDE_VIEW
     model.geom_group[hidden] = 5
@@ -47,12 +47,12 @@ def test_the_outside_view_shows_the_vehicle_in_its_world(vehicle: str) -> None:
     rows, columns = np.nonzero(shown)
     assert abs(columns.mean() - 80.0) < 16.0
     assert abs(rows.mean() - 60.0) < 16.0
-    assert empty[80:].std(axis=(0, 1)).max() > 4.0  # No plain ground.
+    assert empty[80:].std(axis=(0, 1)).max() > 4.0  # The ground has a texture.
 
 
 @pytest.mark.parametrize("vehicle", HOME)
-def test_the_own_camera_does_not_see_it(vehicle: str) -> None:
-    """What is drawn for views from outside leaves the camera's image as it is."""
+def test_the_onboard_camera_does_not_see_the_vehicle(vehicle: str) -> None:
+    """Geoms for outside views, and rendering such views, do not change the camera's image."""
     world = MujocoWorld(vehicle, size=(160, 120))
     before = world.picture()
     world.outside(160, 120)

@@ -1,4 +1,4 @@
-"""A small hand-made course."""
+"""A small course for tests."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Course, Lamp, Obstacle, Surface, Wall
+from shapechanger.vehicles.courses.geometry import resample
 
 _KINDS: dict[str, tuple[Surface, ...]] = {
     "corridor": ("plaster", "door", "window", "brick", "board", "glass"),
@@ -16,16 +17,7 @@ _KINDS: dict[str, tuple[Surface, ...]] = {
 
 def square(world: str) -> Course:
     """Return a loop around a block of 4 m; the lane is 2 m wide, x and y from -1 to 7 m."""
-    side = np.arange(0.0, 6.0, 0.1)
-    zero, six = np.zeros_like(side), np.full_like(side, 6.0)
-    route = np.concatenate(
-        [
-            np.stack([side, zero], axis=1),
-            np.stack([six, side], axis=1),
-            np.stack([6.0 - side, six], axis=1),
-            np.stack([zero, 6.0 - side], axis=1),
-        ]
-    )
+    route = resample(np.array([(0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0)]), 0.1)
     outer = [(-1.0, -1.0), (7.0, -1.0), (7.0, 7.0), (-1.0, 7.0)]
     inner = [(1.0, 1.0), (1.0, 5.0), (5.0, 5.0), (5.0, 1.0)]
     kinds = _KINDS[world]
@@ -57,10 +49,7 @@ def with_walls(course: Course, *walls: Wall) -> Course:
 
 
 def in_lane(course: Course, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which points, m, (n, 2), are within the lane, by the number of walls that a ray meets.
-
-    The lane is between two closed lines, and everything else is inside the inner or outside both.
-    """
+    """Return which points, m, (n, 2), are in the lane: their rays cross an odd number of walls."""
     starts = np.array([wall.start for wall in course.walls])
     ends = np.array([wall.end for wall in course.walls])
     x, y = points[:, None, 0], points[:, None, 1]

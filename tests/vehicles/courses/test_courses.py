@@ -1,4 +1,4 @@
-"""Properties of all courses, and the geometry of lines and obstacles."""
+"""Properties of courses, starts, and the geometry of lines and obstacles."""
 
 import math
 from dataclasses import replace
@@ -57,7 +57,7 @@ def test_the_seed_determines_the_course(world: str) -> None:
 
 @pytest.mark.parametrize("seed", [0, HELD_OUT[0]])
 def test_a_flooded_corridor_has_the_courses_of_the_corridor(seed: int) -> None:
-    """Only the name of the world differs, so that a boat and a car drive the same lanes."""
+    """A boat and a car drive in the same lanes."""
     flooded = lay_out(FLOODED, seed)
     assert _same(flooded, _laid("corridor", seed))
     assert flooded.world == FLOODED
@@ -93,7 +93,7 @@ def test_walls_form_closed_lines_that_face_the_lane(world: str) -> None:
 
 
 @each_world
-def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
+def test_half_width_is_the_distance_from_the_walls(world: str) -> None:
     low, high = _WIDTHS[world]
     for course in _courses(world):
         nearest = distances_to_segments(course.route, wall_segments(course.walls)).min(axis=1)
@@ -104,7 +104,7 @@ def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
 
 
 @each_world
-def test_the_whole_lane_has_the_promised_gap(world: str) -> None:
+def test_the_lane_has_its_gap_everywhere(world: str) -> None:
     """A disc of diameter `gap_m` can be moved around the course, past all obstacles."""
     step_m = 0.04
     for course in _courses(world)[::2]:
@@ -122,7 +122,7 @@ def test_the_whole_lane_has_the_promised_gap(world: str) -> None:
 
 
 def test_yards_and_harbours_have_every_kind() -> None:
-    """Over all seeds every surface and obstacle occurs, and quays have their height."""
+    """Every surface and obstacle occurs in some course, and quays are 0.6 m high."""
     for world, surfaces, obstacles in (
         ("yard", {"hedge", "fence", "brick", "shed"}, {"cone", "crate", "bin", "post", "tree"}),
         ("harbour", {"quay", "rock"}, {"buoy", "dinghy", "crate"}),
@@ -158,7 +158,7 @@ def test_starts_are_on_the_route_and_free(world: str, seed: int) -> None:
         step = course.route[(i + 1) % len(far)] - course.route[i]
         turned = math.atan2(step[1], step[0]) - pose.heading
         assert abs((turned + math.pi) % (2 * math.pi) - math.pi) < 0.1
-        # One metre of vehicle and trailer, 0.24 m wide, from 0.3 m before the pose backwards.
+        # A vehicle with a trailer, 1.1 m long and 0.24 m wide; its nose is 0.3 m ahead of the pose.
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
         body = Obstacle(
             "box", pose.x - 0.25 * cos, pose.y - 0.25 * sin, pose.heading, 1.1, 0.24, 0.2
@@ -171,7 +171,7 @@ def test_starts_are_on_the_route_and_free(world: str, seed: int) -> None:
         )
 
 
-def test_a_full_lane_starts_at_its_first_point() -> None:
+def test_without_a_free_start_the_first_point_is_used() -> None:
     course = lay_out("corridor", 0)
     full = replace(
         course,

@@ -1,6 +1,8 @@
-"""Looks, textures, meshes, and collision geoms of courses."""
+"""Looks, textures, meshes, images, and collision geoms of courses."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -8,13 +10,14 @@ import pytest
 from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName
-from shapechanger.vehicles.courses import lay_out
-from shapechanger.vehicles.courses.course import LOOKS, VARIANTS, Course, Look
+from shapechanger.vehicles.cameras.camera import OnboardCamera
+from shapechanger.vehicles.courses import lay_out, textures
+from shapechanger.vehicles.courses.course import LOOKS, VARIANTS, Course, Look, Wall
 from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
 from shapechanger.vehicles.courses.scene import add_course
 from shapechanger.vehicles.courses.surfaces import BANK_M, QuadMesh, Surfaces, fittings, moored
 from shapechanger.vehicles.courses.textures import PAINTERS, texture
-from tests.vehicles.courses.scenes import in_lane, square
+from tests.vehicles.courses.scenes import in_lane, square, with_walls
 
 
 @pytest.mark.parametrize("world", LOOKS)
@@ -68,7 +71,7 @@ def test_repeating_textures_have_no_seam(name: str) -> None:
 
 
 _SEEDS = (0, 1, 2, 5, 1_000_000)
-# Tyres and ladders stand out of their wall.
+# Largest distance by which tyres and ladders stick out of a wall, m.
 _PROUD_M = 0.021
 
 
@@ -83,7 +86,7 @@ def _points(mesh: QuadMesh) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("seed", _SEEDS)
 def test_the_lane_stays_free(seed: int) -> None:
-    """Fittings, moored boats and tops of quays are behind the walls, but for tyres and ladders."""
+    """Fittings, moored boats and quays are behind the walls, except for tyres and ladders."""
     course = lay_out("harbour", seed)
     banks = Surfaces(course, Look.of("harbour")).walls()
     flat = np.concatenate([_points(p) for p in (*banks.values(), fittings(course))])[:, :2]
@@ -93,8 +96,8 @@ def test_the_lane_stays_free(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", _SEEDS)
-def test_boats_lie_behind_quays(seed: int) -> None:
-    """Several boats lie at a quay, and none overlaps with a quay or another boat."""
+def test_boats_are_moored_behind_quays(seed: int) -> None:
+    """There are at least three boats, and none overlaps with a quay or another boat."""
     course = lay_out("harbour", seed)
     boats = moored(course)
     assert len(boats) >= 3
@@ -108,8 +111,8 @@ def test_boats_lie_behind_quays(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", _SEEDS)
-def test_obstacles_are_drawn_where_the_course_says(seed: int) -> None:
-    """Each is drawn within its collision geom, and fills it at the height of a boat's hull."""
+def test_obstacles_are_drawn_at_their_place(seed: int) -> None:
+    """The drawn extent of an obstacle equals its size."""
     course = lay_out("harbour", seed)
     for obstacle in course.obstacles:
         alone = replace(course, obstacles=(obstacle,))
@@ -177,3 +180,75 @@ def test_the_visible_side_of_a_wall_is_its_collision_surface() -> None:
     model = _compiled("corridor", **_HULL)
     assert _touched(model, 3.5, -0.89, 0.3) == set()
     assert _touched(model, 3.5, -0.91, 0.3) == {"world/wall/0"}
+
+
+_WHITE = Look(light=1.0, warmth=0.0, contrast=0.0, gloss=0.0)
+_WIDTH, _HEIGHT = 160, 120
+
+
+def _draw(
+    course: Course, look: Look, place: tuple[float, float], angle: float
+) -> NDArray[np.uint8]:
+    """Render the view at `place`, 0.5 m above the ground, along `angle`, rad."""
+    spec = mujoco.MjSpec()
+    add_course(spec, course, look)
+    cos, sin = float(np.cos(angle)), float(np.sin(angle))
+    spec.worldbody.add_camera(
+        name="eye", pos=[*place, 0.5], xyaxes=[sin, -cos, 0.0, 0.0, 0.0, 1.0], fovy=66.0
+    )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = OnboardCamera((_WIDTH, _HEIGHT), "eye")
+    try:
+        return camera.picture(model, data)
+    finally:
+        camera.close()
+
+
+@pytest.fixture
+def quarters(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Paint windows with a texture that is green at the top left, red on the right, blue below."""
+
+    def painted(rng: np.random.Generator) -> NDArray[np.float32]:
+        del rng
+        image = np.zeros((64, 64, 3), np.float32)
+        image[:32, :32, 1] = image[:32, 32:, 0] = image[32:, :, 2] = 1.0
+        return image
+
+    monkeypatch.setattr(
+        textures, "PAINTERS", MappingProxyType({**textures.PAINTERS, "window": painted})
+    )
+    textures.texture.cache_clear()
+    yield
+    textures.texture.cache_clear()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl", "quarters")
+@pytest.mark.parametrize("angle", [0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi])
+def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
+    ahead = np.array([np.cos(angle), np.sin(angle)])
+    right = np.array([ahead[1], -ahead[0]])
+    # A wall 1.8 m wide, 1 m ahead; its visible side is on the left of its direction.
+    start, end = ahead + 0.9 * right, ahead - 0.9 * right
+    wall = Wall((start[0], start[1]), (end[0], end[1]), 1.0, "window")
+    picture = _draw(with_walls(square("corridor"), wall), _WHITE, (0.0, 0.0), angle)
+    top, bottom = _HEIGHT // 2 - 20, _HEIGHT // 2 + 20
+    left, right_hand = _WIDTH // 2 - 30, _WIDTH // 2 + 30
+    assert picture[top, left].argmax() == 1
+    assert picture[top, right_hand].argmax() == 0
+    assert picture[bottom, left].argmax() == picture[bottom, right_hand].argmax() == 2
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_glossy_floor_reflects_lamps() -> None:
+    course = square("corridor")
+    dull, glossy = (
+        _draw(course, replace(Look.of("corridor"), gloss=gloss), (-0.5, 0.0), 0.0)
+        for gloss in (0.0, 0.6)
+    )
+    # In this yellow light, only the lamp is white.
+    below = slice(_HEIGHT // 2, None)
+    assert glossy[below, :, 2].max() > 1.5 * dull[below, :, 2].max()

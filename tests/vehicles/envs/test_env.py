@@ -65,7 +65,7 @@ def test_each_vehicle_drives_in_its_default_world(vehicle: str) -> None:
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_episodes_are_independent(vehicle: str) -> None:
-    """An episode does not depend on earlier ones: trailer, current and sensors are reset."""
+    """A reset also resets trailer, motor current and sensors."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         wanted = _played(env, 3)
         _played(env, 4)
@@ -86,7 +86,7 @@ def test_episodes_are_independent(vehicle: str) -> None:
 def test_a_collision_costs_and_ends_the_episode(
     made: Callable[..., Any], weight: float, put_back: bool
 ) -> None:
-    """With `put_back` the episode goes on, free of the wall and at rest."""
+    """With `put_back` the episode continues, and the vehicle is at rest away from the wall."""
     with closing(made(put_back=put_back)) as env:
         env.reset(seed=1)
         found = 0
@@ -169,14 +169,14 @@ def test_render_shows_the_cameras_picture() -> None:
         assert picture.std() > 5.0
 
 
-def test_the_numbers_of_the_lab_robots_are_those_of_their_profiles() -> None:
-    """Run `python -m scripts.lab_robots` after a change of a profile."""
+def test_the_copied_numbers_equal_the_profiles() -> None:
+    """After a change of a profile, `python -m scripts.lab_robots` copies its numbers."""
     file = Path(drive.__file__).with_name("lab_robots.json")
     assert file.read_text("utf-8") == lab_robots_json()
 
 
 def test_a_shipped_profile_and_its_copy_give_the_same_robot(tmp_path: Path) -> None:
-    """A profile of the user's own is read by the robot's modules."""
+    """The modules of real robots read a copied profile, and find the same numbers."""
     copy = tmp_path / "mine.toml"
     copy.write_bytes(find_profile("lab-car").read_bytes())
     mine, lab = (drive.simulated_robot("car", robot) for robot in (copy, None))
@@ -185,20 +185,13 @@ def test_a_shipped_profile_and_its_copy_give_the_same_robot(tmp_path: Path) -> N
 
 @pytest.mark.parametrize(("env", "most"), [("CarRanges", 55), ("Car", 55)])
 def test_a_simulation_loads_no_module_of_the_robot(env: str, most: int) -> None:
-    """Making an env loads only what it simulates."""
+    """Making an env loads few modules of the package, and none for real robots."""
     script = f"import gymnasium, shapechanger, sys; gymnasium.make('shapechanger/{env}-v1')"
     command = [sys.executable, "-c", f"{script}; print(*sys.modules)"]
     loaded = subprocess.check_output(command, text=True).split()
     ours = [name for name in loaded if name.partition(".")[0] == "shapechanger"]
     assert len(ours) <= most
     assert not [name for name in ours if name.startswith("shapechanger.robot")]
-
-
-def _courses(courses: Any, n: int = 6, *, held_out: bool = False) -> list[int]:
-    with closing(RangesEnv("car", courses=courses)) as env:
-        if held_out:
-            env.hold_out()
-        return [env.reset(seed=1 if i == 0 else None)[1]["course"] for i in range(n)]
 
 
 @pytest.mark.parametrize(
@@ -212,7 +205,10 @@ def _courses(courses: Any, n: int = 6, *, held_out: bool = False) -> list[int]:
     ],
 )
 def test_courses_are_drawn_from_their_seeds(courses: Any, held_out: bool, seeds: Any) -> None:
-    drawn = _courses(courses, held_out=held_out)
+    with closing(RangesEnv("car", courses=courses)) as env:
+        if held_out:
+            env.hold_out()
+        drawn = [env.reset(seed=seed)[1]["course"] for seed in (1, *[None] * 5)]
     assert all(course in seeds for course in drawn)
     assert len(set(drawn)) > 1
     assert not set(TRAINING) & set(HELD_OUT)
@@ -274,7 +270,7 @@ def test_a_disturbed_demonstrator_makes_progress(vehicle: str) -> None:
 
 
 def test_another_control_rate_is_refused(tmp_path: Path) -> None:
-    """The experts count in steps of 1/20 s."""
+    """Experts need a control period of 1/20 s."""
     slow = tmp_path / "slow.toml"
     text = find_profile("lab-car").read_text()
     slow.write_text(text.replace("control_hz = 20", "control_hz = 10"))

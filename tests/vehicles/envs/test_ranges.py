@@ -38,8 +38,8 @@ def test_the_fast_env_matches_the_full_robot(vehicle: str) -> None:
         assert other["collisions"] == info["collisions"] == 0
 
 
-def test_distances_are_those_to_the_walls() -> None:
-    """Across the lane, they add up to its width, in either direction."""
+def test_distances_end_at_the_walls() -> None:
+    """The distances to the left and right add up to the width of the lane in both directions."""
     with closing(RangesEnv("car")) as env:
         seen, _ = env.reset(options=_COURSE)
         distances = dict(zip(BEARINGS_DEG, seen, strict=False))
@@ -75,7 +75,7 @@ def test_the_pause_after_a_collision_matches_the_full_robot() -> None:
 
 
 def test_outputs_follow_the_guards_limits() -> None:
-    """Outputs have the guard's caps, slew and bump block."""
+    """Outputs are limited by the guard's caps, slew and stop after a bump."""
     plan = GuardPlan(
         "test",
         (ActionPlan("throttle", high=0.5, slew_per_s=4.0, propels=True),),
@@ -93,8 +93,8 @@ def test_outputs_follow_the_guards_limits() -> None:
     assert blocked[2] == pytest.approx(0.08)
 
 
-def test_a_vehicle_that_stands_is_moved() -> None:
-    """At rest a small throttle acts with the least size, in its direction, and 0 stays 0."""
+def test_a_small_throttle_moves_a_vehicle_at_rest() -> None:
+    """At rest, the size of a throttle other than 0 is raised to `LEAST_THROTTLE`."""
     for throttle, least_m, most_m in ((0.05, 0.03, 1.0), (-0.05, -1.0, -0.03), (0.0, -0.01, 0.01)):
         with closing(RangesEnv("car")) as env:
             env.reset(options=_COURSE)
@@ -103,8 +103,8 @@ def test_a_vehicle_that_stands_is_moved() -> None:
             assert least_m <= info["progress"] <= most_m, throttle
 
 
-def test_a_teacher_leaves_rest_alike() -> None:
-    """A teacher demonstrates the throttle that moved the vehicle in the teacher's env."""
+def test_teachers_demonstrate_the_raised_throttle() -> None:
+    """At rest, a teacher's throttle is raised as in the env in which the teacher learned."""
     action = np.array([1.0, -0.02], np.float32)
     with closing(VehicleEnv("car", image=False)) as env:
         env.reset(options=_COURSE)

@@ -51,7 +51,7 @@ _BODIES = {"wheels": SteeringResponse(2.0, 0.0), "tracks": SteeringResponse(0.8,
 @pytest.mark.parametrize("body", _BODIES)
 @pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
 def test_commands_lead_back_to_their_waypoints(body: str, speed: float) -> None:
-    """Within the range of steering and throttle, the two are inverse to each other."""
+    """Within the range of steering and throttle, `waypoints_of` is the inverse of `command`."""
     response = _BODIES[body]
     bearings, shares = np.meshgrid(np.linspace(-0.7, 0.7, 15), np.linspace(-0.5, -0.1, 5))
     wanted = np.stack((bearings.ravel(), shares.ravel()), axis=1).astype(np.float32)
@@ -62,19 +62,19 @@ def test_commands_lead_back_to_their_waypoints(body: str, speed: float) -> None:
     within = ~found.at_limit
     assert within.mean() > 0.7
     np.testing.assert_allclose(found.actions[within], wanted[within], atol=1e-5)
-    # At the limit, too, the waypoint has the same command, if not the same bearing.
+    # At the limit, the waypoint has the same command, but not always the same bearing.
     again = [command(one, response, speed, on_the_spot=False) for one in found.actions]
     np.testing.assert_allclose(again, commands, atol=1e-5)
 
 
 def test_commands_that_do_not_point_ahead_are_not_usable() -> None:
-    """Standing, driving backward, and an unknown speed say nothing; braking and starting do."""
+    """Braking and starting are usable; standing, driving backward and unknown speeds are not."""
     commands = np.array(
         [
             (0.5, 0.0),  # Stands, with turned wheels.
             (0.5, 0.1),  # Stands, with too little throttle.
-            (0.0, -0.6),  # Begins to back.
-            (0.3, -0.6),  # Backs.
+            (0.0, -0.6),  # Starts backward.
+            (0.3, -0.6),  # Drives backward.
             (0.0, 0.5),  # Unknown speed.
             (np.nan, 0.5),
             (0.3, 0.5),  # Starts.
@@ -91,7 +91,7 @@ def test_commands_that_do_not_point_ahead_are_not_usable() -> None:
 
 @pytest.mark.parametrize("body", _BODIES)
 def test_the_response_is_fitted_to_a_drive(body: str) -> None:
-    """Steps with changing steering, in which the turn lags, and unknown ones are left out."""
+    """Steps with changing steering, in which the turn lags, and NaN are ignored."""
     rng = np.random.default_rng(0)
     steering = np.repeat(rng.uniform(-0.6, 0.6, 60), 6)
     speed = np.repeat(rng.uniform(0.5, 2.0, 60), 6)
@@ -105,8 +105,8 @@ def test_the_response_is_fitted_to_a_drive(body: str) -> None:
     assert found.per_second == pytest.approx(_BODIES[body].per_second, abs=0.05)
 
 
-def test_a_drive_that_does_not_tell_the_response_is_refused() -> None:
-    """Straight driving, turning against the steering, and no measurement are refused."""
+def test_a_drive_without_a_clear_response_is_refused() -> None:
+    """Straight driving, turning against the steering, and NaN are refused."""
     rng = np.random.default_rng(0)
     steering, speed = np.repeat(rng.uniform(-0.6, 0.6, 40), 5), np.ones(200)
     times_s = np.arange(200) / 20.0
@@ -121,9 +121,7 @@ def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
     lines = find_profile("lab-car").read_text().splitlines()
     path = tmp_path / "car.toml"
     path.write_text("\n".join(line for line in lines if not line.startswith("pitch_deg")))
-    with pytest.raises(
-        ProfileError, match=r"\[camera\] does not state pitch_deg and fovy_deg, which"
-    ):
+    with pytest.raises(ProfileError, match=r"\[camera\] does not state pitch_deg and fovy_deg"):
         WaypointEnv("car", robot=path)
 
 
@@ -134,7 +132,7 @@ def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
 def test_sensed_waypoints_without_the_sensors_are_refused(
     tmp_path: Path, sensors: tuple[str, ...], missing: str
 ) -> None:
-    """With `sensed`, waypoints need measurements, and the error names the missing ones."""
+    """With `sensed`, waypoints need sensors of speed and rate of turn."""
     text = find_profile("lab-car").read_text(encoding="utf-8")
     for sensor in sensors:
         text = re.sub(rf"^\[sensor\.{sensor}\]\n(?:[^\[\n].*\n|\n)*", "", text, flags=re.MULTILINE)
@@ -148,7 +146,7 @@ def test_the_measured_response_matches_the_geometry() -> None:
     with closing(RangesEnv("car", put_back=True)) as env:
         places = env.observation_layout.slices
         found = measure_response(env, places["speed"].start, places["yaw_rate"].start)
-    # The tangent of the full lock over the wheelbase, 1/m; the tyres slip a little.
+    # The tangent of the full lock divided by the wheelbase, 1/m; the tyres slip a little.
     drawn = math.tan(math.radians(28.0)) / 0.26
     assert found.per_metre + found.per_second == pytest.approx(drawn, rel=0.15)
 
@@ -201,8 +199,8 @@ def test_a_shift_shows_the_map_of_waypoints_to_each_body() -> None:
 
 
 @pytest.mark.gl
-def test_shifts_without_another_vehicle() -> None:
-    """The same vehicle is no shift; a lens changes no response, and a wrapper no property."""
+def test_shifts_of_one_vehicle() -> None:
+    """An equal env is refused; a lens does not change the motion, and a wrapper no property."""
     size = (40, 30)
     with (
         closing(VehicleEnv("car", size=size, put_back=True)) as car,

@@ -16,42 +16,35 @@ from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import HOME, Course, Obstacle, Wall
-from shapechanger.vehicles.courses.geometry import FAR_M, ClearanceField, ClosedLine, CourseProgress
+from shapechanger.vehicles.courses.geometry import (
+    FAR_M,
+    ClearanceField,
+    ClosedLine,
+    CourseProgress,
+    length,
+    normals,
+    resample,
+)
 from shapechanger.vehicles.envs import RangesEnv
 from shapechanger.vehicles.expert.driver import TRAITS, CourseExpert, plan_path_for
 from shapechanger.vehicles.expert.path import CoursePath, plan_path
 
 
-def ring(
-    seed: int,
-    *,
-    half_width: float = 1.0,
-    radius: float = 8.0,
-    obstacles: int = 10,
-    gap: float = 0.9,
-    current: tuple[float, float] = (0.0, 0.0),
-) -> Course:
-    """Return a wavy ring with boxes and posts on both sides that leave a gap of at least `gap`."""
+def ring(seed: int, *, radius: float = 8.0, obstacles: int = 10) -> Course:
+    """Return a wavy ring, 2 m wide, with boxes and posts on both sides that leave gaps of 0.9 m."""
+    half_width, gap = 1.0, 0.9
     rng = np.random.default_rng(seed)
     turns = np.linspace(0.0, 2 * np.pi, 400, endpoint=False)
     phases = rng.uniform(0, 2 * np.pi, 2)
     far = radius * (1 + 0.12 * np.cos(2 * turns + phases[0]) + 0.08 * np.cos(3 * turns + phases[1]))
     route = np.stack((far * np.cos(turns), far * np.sin(turns)), axis=1)
-    for _ in range(3):  # Even spacing.
-        closed = np.vstack((route, route[:1]))
-        stations = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))))
-        even = np.linspace(0.0, stations[-1], 400, endpoint=False)
-        route = np.stack([np.interp(even, stations, closed[:, j]) for j in (0, 1)], axis=1)
-    ahead = np.roll(route, -1, axis=0) - np.roll(route, 1, axis=0)
-    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
-    left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
+    route = resample(route, length(route) / 400)
+    left = normals(route)
     walls: list[Wall] = []
     for side in (1, -1):
         edge = (route + side * half_width * left)[::4][::-side]
-        walls += [
-            Wall((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), 0.5, "plaster")
-            for a, b in zip(edge, np.roll(edge, -1, axis=0), strict=True)
-        ]
+        ends = zip(edge, np.roll(edge, -1, axis=0), strict=True)
+        walls += [Wall.between(start, end, 0.5, "plaster") for start, end in ends]
     stand: list[Obstacle] = []
     for n in range(obstacles):
         i = int((n + rng.uniform(0.2, 0.8)) * len(route) / obstacles)
@@ -59,7 +52,7 @@ def ring(
         reach = float(rng.uniform(0.3, 2 * half_width - gap - 0.1))
         side = rng.choice((-1, 1))
         x, y = route[i] + side * (half_width - reach + size / 2) * left[i]
-        yaw = float(np.arctan2(ahead[i, 1], ahead[i, 0]))
+        yaw = float(np.arctan2(-left[i, 0], left[i, 1]))
         kind = "box" if rng.random() < 0.5 else "post"
         stand.append(Obstacle(kind, float(x), float(y), yaw, size, size, 0.4))
     return Course(
@@ -72,7 +65,6 @@ def ring(
         lamps=(),
         ceiling_m=0.0,
         gap_m=gap,
-        current_mps=current,
     )
 
 
@@ -81,7 +73,7 @@ _RING = ClosedLine(ring(0).route)
 
 
 def test_signed_distances_of_a_square() -> None:
-    """The left of a counter-clockwise line is its inside, with positive distances."""
+    """Distances are positive on the left, the inside of a counter-clockwise line."""
     assert _SQUARE.length == 16.0
     assert _SQUARE.nearest(1.0, 0.5) == pytest.approx((1.0, 0.5))
     assert _SQUARE.nearest(1.0, -0.5) == pytest.approx((1.0, -0.5))
@@ -90,15 +82,15 @@ def test_signed_distances_of_a_square() -> None:
 
 @given(station=st.floats(-200.0, 200.0))
 def test_at_inverts_nearest(station: float) -> None:
-    """Stations wrap around."""
+    """The station of the point at a station is this station, up to whole laps."""
     x, y = _RING.at(station)
     spot = _RING.nearest(x, y)
     assert abs(_RING.ahead_by(station, spot.station)) < 1e-6
     assert abs(spot.lateral) < 1e-6
 
 
-def test_a_hint_selects_the_leg() -> None:
-    """With a hint, a nearer parallel leg is ignored."""
+def test_a_hint_selects_a_part_of_the_line() -> None:
+    """With a hint, a nearer parallel part far along the line is ignored."""
     there = [(x, 0.0) for x in np.arange(0.0, 20.0, 0.1)]
     back = [(x, 1.0) for x in np.arange(20.0, 0.0, -0.1)]
     line = ClosedLine(np.array(there + back))
@@ -106,8 +98,8 @@ def test_a_hint_selects_the_leg() -> None:
     assert line.nearest(10.0, 0.9, hint=9.8).station == pytest.approx(10.0)
 
 
-def test_progress_counts_laps_and_counts_down() -> None:
-    """Progress counts whole laps, and backward motion subtracts."""
+def test_progress_is_the_net_distance() -> None:
+    """Progress adds whole laps, and subtracts backward motion."""
     course = ring(0)
     line = ClosedLine(course.route)
     progress = CourseProgress(course)
@@ -134,7 +126,7 @@ def _planned(vehicle: str, seed: int) -> tuple[Course, CoursePath, float]:
 
 @pytest.mark.parametrize(("vehicle", "seed"), _CASES)
 def test_properties_of_a_path(vehicle: str, seed: int) -> None:
-    """A path is closed, evenly spaced, follows the lane once, and keeps its clearance."""
+    """A path is closed, evenly spaced, goes around the lane once, and keeps its clearance."""
     course, path, least = _planned(vehicle, seed)
     steps = np.roll(path.points, -1, axis=0) - path.points
     sizes = np.hypot(steps[:, 0], steps[:, 1])
@@ -174,8 +166,8 @@ def test_a_gap_is_found_until_it_is_too_narrow() -> None:
 
 
 @pytest.mark.parametrize("seed", [480, 889, 1_000_074])
-def test_a_boat_gets_through_every_flooded_corridor(seed: int) -> None:
-    """With two thirds of its clearance if the whole does not fit."""
+def test_a_boat_passes_narrow_flooded_corridors(seed: int) -> None:
+    """If no path has the whole margin of the boat, a path with two thirds of it is planned."""
     course, boat = lay_out("flooded-corridor", seed), TRAITS["boat"]
     with pytest.raises(WorldError):
         plan_path(course, boat.half_width_m, boat.margin_m, comfort_m=boat.comfort_m)
@@ -210,8 +202,8 @@ def _progress_m(env: RangesEnv, seconds: float) -> float:
 
 
 @pytest.mark.parametrize("name", HOME)
-def test_each_vehicle_drives_round_its_world(name: str) -> None:
-    """The expert is fast and has no contact; the current of harbours does not push it aside."""
+def test_the_expert_drives_each_vehicle(name: str) -> None:
+    """The expert is fast and has no contact, also in the current of a harbour."""
     with closing(RangesEnv(name)) as env:
         env.reset(options={"course": 1, "start": 1})
         metres = _progress_m(env, 20.0)
@@ -236,7 +228,7 @@ def test_a_vehicle_recovers_from_a_wall(name: str, side: int) -> None:
 
 
 def test_the_expert_backs_up_when_it_is_stuck() -> None:
-    """Recovery starts after 0.7 s of throttle without motion, and follows from the seed."""
+    """Recovery starts after 0.7 s of throttle without motion, and depends on the seed."""
 
     def actions(seed: int) -> NDArray[np.float32]:
         expert = CourseExpert(ring(1), "car", seed)

@@ -1,4 +1,4 @@
-"""Which policies may drive a robot, and a policy that runs on a twin's computer."""
+"""Checks of policies before they drive a robot, and policies that run on board of a twin."""
 
 import contextlib
 import os
@@ -6,6 +6,7 @@ import signal
 import subprocess
 from collections.abc import Generator
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -34,8 +35,8 @@ _CLONE = clone_card()
 _WAYPOINTS = clone_card(ACTION_LAYOUT)
 
 
-def test_policies_that_fit() -> None:
-    """A clone of the same body and rate, and waypoints from any body."""
+def test_policies_that_fit_are_accepted() -> None:
+    """Clones of the same body and rate fit, and policies with waypoints of any body."""
     require_fit(clone_card(body="car", control_hz=20.0), _CAR, measures=False)
     require_fit(_CLONE, _CAR, measures=False)
     require_fit(clone_card(ACTION_LAYOUT, control_hz=20.0), _CAR, measures=False)
@@ -55,7 +56,7 @@ def test_policies_that_fit() -> None:
         (_WAYPOINTS, replace(_CAR, turning=None), "turn_deg_per_m or turn_deg_per_s"),
     ],
 )
-def test_policies_that_do_not_fit(card: PolicyCard, robot: RobotCard, text: str) -> None:
+def test_unsuitable_policies_are_refused(card: PolicyCard, robot: RobotCard, text: str) -> None:
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
         require_fit(card, robot, measures=False)
     assert text in str(refusal.value)
@@ -79,7 +80,7 @@ def student(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("lab-car", "", "There is no policy NAME.onnx"),
     ],
 )
-def test_serving_refuses_other_policies(
+def test_serve_refuses_unsuitable_policies(
     profile: str,
     name: str,
     text: str,
@@ -100,20 +101,20 @@ def test_serving_refuses_other_policies(
 
 
 @contextlib.contextmanager
-def _served(policy: Path, clock: str) -> Generator[tuple[RunningRobot, RobotClient]]:
+def _served(
+    policy: Path, clock: Literal["twin", "real"]
+) -> Generator[tuple[RunningRobot, RobotClient]]:
     """A twin of lab-car with a policy on board, armed for it by a person who watches."""
-    with run_robot(
-        find_profile("lab-car"),
-        clock="twin" if clock == "twin" else "real",
-        arguments=("--policy", str(policy)),
-    ) as robot:
-        pace = "lockstep" if clock == "twin" else "realtime"
-        with robot.client(role="person", frames=False, pace=pace) as person:
-            until(lambda: person.ask().message.holder == policy.stem)
-            # A policy that fails at once releases the robot before the answer.
-            with contextlib.suppress(RobotRefused):
-                person.arm()
-            yield robot, person
+    arguments, pace = ("--policy", str(policy)), "lockstep" if clock == "twin" else "realtime"
+    with (
+        run_robot(find_profile("lab-car"), clock=clock, arguments=arguments) as robot,
+        robot.client(role="person", frames=False, pace=pace) as person,
+    ):
+        until(lambda: person.ask().message.holder == policy.stem)
+        # A policy that fails at once releases the robot before the answer.
+        with contextlib.suppress(RobotRefused):
+            person.arm()
+        yield robot, person
 
 
 def _pilot(robot: RunningRobot) -> int:
@@ -134,7 +135,7 @@ def _policies(person: RobotClient) -> PolicyState:
 @pytest.mark.system
 @pytest.mark.realtime
 def test_a_policy_drives_on_board(student: Path) -> None:
-    """The policy drives once a person arms, until one takes over; it is ended and restarted."""
+    """The policy drives from arming until a person takes over; it can be ended and restarted."""
     with _served(student, "twin") as (robot, person), robot.operator() as operator:
         until(lambda: operator.where().truth["progress_m"] > 2.0)
         # Guard, daemon and twin have a higher priority, where the system permits it.
@@ -151,7 +152,7 @@ def test_a_policy_drives_on_board(student: Path) -> None:
         person.release()
         person._post(RunPolicy(policy="student"))
         until(lambda: person.ask().message.holder == "student")
-        # Nothing moves before a person arms the robot again.
+        # The robot stays disarmed until a person arms it again.
         assert not person.ask().message.armed
 
 
@@ -161,6 +162,7 @@ def test_a_policy_drives_on_board(student: Path) -> None:
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_policy_that_dies_or_hangs_stops_the_robot(student: Path, number: int) -> None:
     """The robot stops without any action of a person."""
+    killed = "student ended: its process ended with code -9."
     with _served(student, "twin" if number == signal.SIGKILL else "real") as (robot, person):
         until(lambda: _moves(person))
         pid = _pilot(robot)
@@ -168,9 +170,7 @@ def test_a_policy_that_dies_or_hangs_stops_the_robot(student: Path, number: int)
         until(lambda: not _moves(person))
         if number == signal.SIGKILL:
             until(lambda: person.ask().message.holder == "")
-            until(
-                lambda: _policies(person).text == "student ended: its process ended with code -9."
-            )
+            until(lambda: _policies(person).text == killed)
         else:
             os.kill(pid, signal.SIGCONT)
 
@@ -178,8 +178,8 @@ def test_a_policy_that_dies_or_hangs_stops_the_robot(student: Path, number: int)
 @pytest.mark.gl
 @pytest.mark.system
 @pytest.mark.realtime
-def test_a_policy_of_nan_moves_nothing(tmp_path: Path) -> None:
-    """The program ends with a sentence at the first action, and the robot stays at rest."""
+def test_a_policy_that_returns_nan_is_ended(tmp_path: Path) -> None:
+    """The process ends with a message at the first action, and the robot stays at rest."""
     policy = CameraPolicy.blank(_CLONE, seed=0)
     policy.network.hands.bias.data[:] = np.nan
     file = tmp_path / "nan.onnx"
