@@ -17,7 +17,7 @@ from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.postures import moving_torque
 from shapechanger.finger.tensions import drive_of, tensions_for_torque
 
-# With every imperfection of the model.
+# A finger with friction, stretch, backlash and delay.
 STRETCHED = NOMINAL.replace(
     tendon_stiffness=10e3, tendon_friction=1.0, backlash=0.5e-3, command_delay=0.03
 )
@@ -47,7 +47,7 @@ def at_rest(model: mujoco.MjModel, parameters: FingerParameters = NOMINAL) -> mu
 
 
 def harsh_commands(rng: np.random.Generator) -> Iterator[tuple[str, np.ndarray]]:
-    """Return extreme commands keyed by name, each (n, 7) for steps of 20 ms."""
+    """Yield the names of extreme motions and their commands, (n, 7), for steps of 20 ms."""
     yield "random", rng.uniform(-1.0, 1.0, (50, 7))
     yield "bang-bang", rng.choice([-1.0, 1.0], (50, 7))
     yield "bang-bang, slower", np.repeat(rng.choice([-1.0, 1.0], (5, 7)), 10, axis=0)

@@ -1,4 +1,4 @@
-"""The simulated plant of a finger, and the path of a rig's commands to it."""
+"""The simulated finger, and the path from the commands of a rig to its tensions."""
 
 import math
 from typing import Any
@@ -53,8 +53,8 @@ def test_a_tension_follows_within_the_lag(step: float | None, lag_ms: int) -> No
     np.testing.assert_allclose(seen[lag_ms - 1 :], expected, rtol=1e-3)
 
 
-def test_a_delay_postpones_the_whole_response() -> None:
-    """The response after 12 ms of delay is the prompt one, 12 ms later."""
+def test_a_delay_shifts_the_response() -> None:
+    """With a delay of 12 ms, the tensions follow 12 ms later."""
     rig = _RIG.replace(path={"slew_per_s": 20.0})
     assert FingerParameters.from_json(rig.to_json()) == rig
     prompt, late = (
@@ -64,8 +64,8 @@ def test_a_delay_postpones_the_whole_response() -> None:
     np.testing.assert_allclose(late[:12], NOMINAL.least_tension, atol=1e-9)
 
 
-def test_an_impedance_is_held_between_computations() -> None:
-    """A moving finger does not change the tension until the next one is computed."""
+def test_tensions_are_held_between_computations() -> None:
+    """On a command path, an impedance does not react to motion before the next computation."""
     held = _tensions(_RIG.replace(path=CommandPath()), [0.5, -0.5, 0.5, -0.5], "impedance")
     prompt = _tensions(_RIG, [0.5, -0.5, 0.5, -0.5], "impedance")
     ends = np.array([19, 39, 59, 79])
@@ -78,17 +78,11 @@ _shares = st.floats(0.0, 1.0)
 
 
 @given(up=_slews, down=_slews, now=_shares, aim=_shares)
-def test_the_slew_is_the_guards(
+def test_the_slew_equals_the_guards(
     up: float | None, down: float | None, now: float, aim: float
 ) -> None:
-    """Training uses what the guard does to an action of the profile."""
-    action = ActionPlan(
-        "FDP",
-        0.0,
-        slew_per_s=up or float("inf"),
-        slew_down_per_s=down or float("inf"),
-        one_sided=True,
-    )
+    rates = {"slew_per_s": up or math.inf, "slew_down_per_s": down or math.inf}
+    action = ActionPlan("FDP", 0.0, **rates, one_sided=True)
     path = CommandPath(slew_per_s=up, slew_down_per_s=down)
     ours = float(slewed(np.array([now]), np.array([aim]), *slews(path))[0])
     assert ours == pytest.approx(slewed_by_guard(action, now, aim, 0.01), abs=1e-12)
@@ -108,7 +102,7 @@ def test_the_slew_is_the_guards(
         ({"control_hz": 50.0, "tick_hz": 300.0}, "tick_hz of a path must divide 1000"),
     ],
 )
-def test_bad_values_are_refused(values: dict[str, Any], text: str) -> None:
+def test_invalid_paths_are_refused(values: dict[str, Any], text: str) -> None:
     with pytest.raises((FingerError, UnknownName), match=text):
         FingerPlant(_RIG.replace(path=values), drive_of("tension", NOMINAL))
 
@@ -118,7 +112,7 @@ def test_velocities_have_a_lag_of_40_ms() -> None:
     found = []
     for _ in range(4):
         found.append(velocities.of(angles))
-        angles += (0.02, -0.04)  # A copy was taken.
+        angles += (0.02, -0.04)  # The estimator has copied the array.
     left = [math.exp(-i / 2) for i in range(4)]
     np.testing.assert_allclose(found, [[1.0 - x, -2.0 * (1.0 - x)] for x in left], atol=1e-12)
     velocities.forget()

@@ -1,4 +1,4 @@
-"""Paths: shapes, functions, CSV files, and the laws of all of them."""
+"""Paths: laws of all paths, shapes, functions of time, and CSV files."""
 
 import math
 import pickle
@@ -43,7 +43,7 @@ def wave(t: float) -> Point:
 
 
 def recording(closed: bool, seed: int) -> FingertipPath:
-    """Return a random walk with uneven steps of 8 to 30 ms."""
+    """Return a path through a random walk with time steps of 8 to 30 ms."""
     rng = np.random.default_rng(seed)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.008, 0.03, 40))])
     points = np.cumsum(rng.normal(0.0, 1e-3, (41, 3)), axis=0)
@@ -72,7 +72,7 @@ ending_paths = st.builds(recording, st.just(False), st.integers(0, 20))
 def test_a_closed_path_repeats_without_a_seam(
     path: FingertipPath, part: float, rounds: int
 ) -> None:
-    """Positions are periodic, before 0 s too, and position and velocity are continuous."""
+    """Positions are periodic, also before 0 s; position and velocity are continuous."""
     t = part * path.duration_s
     np.testing.assert_allclose(path.at(t + rounds * path.duration_s), path.at(t), atol=1e-9)
     h = 1e-6
@@ -111,7 +111,7 @@ def test_times_are_batched(path: FingertipPath, times: Sequence[Sequence[float]]
 def test_a_shape_round_trips_through_csv(
     path: Any, digits: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """A shape is not too fast; with six digits and read back, it is within 0.01 mm."""
+    """A shape that is written with six digits and read again is within 0.01 mm."""
     times = np.linspace(0.0, path.duration_s, 1 + math.ceil(100.0 * path.duration_s))
     points = path.at(times)
     assert np.linalg.norm(path.position(times, 1), axis=1).max() <= FASTEST_MPS + 1e-9
@@ -130,8 +130,8 @@ def test_a_shape_round_trips_through_csv(
 @pytest.mark.parametrize(
     "path", [*map(as_path, KINDS), recording(True, 0), recording(False, 1), from_callable(wave)]
 )
-def test_paths_are_values(path: FingertipPath) -> None:
-    """A pickled path has the same positions; writing to a result does not change the path."""
+def test_paths_are_immutable(path: FingertipPath) -> None:
+    """A pickled path has the same positions; changing a result does not change the path."""
     times = np.linspace(-1.0, 3.0, 50)
     copy = pickle.loads(pickle.dumps(path))
     before = path.at(times)
@@ -174,7 +174,7 @@ def test_a_figure_eight_crosses_itself_once() -> None:
     assert towards @ DISTAL > 0 > back @ DISTAL
     np.testing.assert_allclose(np.ptp(points, axis=0), [0.02, 0.0, 0.01], atol=1e-6)
     for half, sign in ((points[:1001], -1), (points[1000:], 1)):
-        # With the normal towards the viewer, palmar is up where distal is right.
+        # If the normal points to the viewer and distal is right, palmar is up.
         right, up = half @ DISTAL, half @ -DORSAL
         assert np.sign(np.sum(right[:-1] * up[1:] - right[1:] * up[:-1])) == sign
     bent = figure_eight(0.02, depth=0.006).at(t) - CENTRE
@@ -186,10 +186,8 @@ def test_a_figure_eight_crosses_itself_once() -> None:
 @pytest.mark.parametrize("phase", [-1.0, 0.3, 2.0])
 def test_a_phase_is_a_shift_in_time(make: Callable[..., FingertipPath], phase: float) -> None:
     t = np.linspace(0.0, 4.0, 50)
-    ahead = phase / (2 * math.pi * 0.25)  # s
-    np.testing.assert_allclose(
-        make(hz=0.25, phase=phase).at(t), make(hz=0.25).at(t + ahead), atol=1e-12
-    )
+    later = make(hz=0.25).at(t + phase / (2 * math.pi * 0.25))
+    np.testing.assert_allclose(make(hz=0.25, phase=phase).at(t), later, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -201,10 +199,7 @@ def test_a_phase_is_a_shift_in_time(make: Callable[..., FingertipPath], phase: f
         (lambda: circle(phase=math.inf), "The phase of a circle must be a finite number, got inf"),
         (lambda: circle(centre=(0.0, 0.0)), "The centre of a circle must be three finite numbers"),
         (lambda: circle(normal=(0, 0, 0)), "The normal of a plane must not be"),
-        (
-            lambda: circle(radius=0.05, hz=10.0),
-            "A circle must not be faster than 2 m/s, got 3.14 m/s",
-        ),
+        (lambda: circle(radius=0.05, hz=10.0), "A circle .* faster than 2 m/s, got 3.14 m/s"),
         (lambda: figure_eight(depth=math.nan), "The depth of a figure eight must be a finite"),
         (lambda: line((1, 2, 3), (1, 2, 3)), "The ends of a line must differ"),
         (lambda: line(end=[1, 2, "c"]), "The end of a line must be three finite numbers"),
@@ -215,11 +210,8 @@ def test_invalid_arguments_are_refused(make: Callable[[], Any], message: str) ->
         make()
 
 
-# Functions
-
-
-def test_positions_are_those_of_the_function() -> None:
-    """Positions are exact; the function is called with floats, never below 0 s."""
+def test_a_function_determines_the_positions() -> None:
+    """Positions are exact; the function is called with floats from 0 s on."""
     seen: list[float] = []
 
     def function(t: float) -> Point:
@@ -234,7 +226,7 @@ def test_positions_are_those_of_the_function() -> None:
 
 @pytest.mark.parametrize("given", [(0.0, 0.0), "abc", (0.0, 0.0, "z"), None, (0, 0, math.nan)])
 def test_a_point_is_three_finite_numbers(given: object) -> None:
-    """Other results raise an error that shows them, at any time of the path."""
+    """The error shows another result, at any time of the path."""
     function: Any = lambda t: given if t > 60.0 else (0.0, 0.0, 0.0)  # noqa: E731
     path = from_callable(function)
     for fails in (lambda: path.at([59.0, 61.0]), lambda: from_callable(lambda _: given)):
@@ -254,13 +246,11 @@ def test_a_point_is_three_finite_numbers(given: object) -> None:
     ],
 )
 def test_a_function_that_jumps_is_refused(function: Callable[[float], Point], when: float) -> None:
-    """A jump is faster than any fingertip, and the error states where."""
+    """The error states the time of the jump."""
     with pytest.raises(PathError, match=rf"^At {when:g} s .* must not be faster than 2 m/s"):
         from_callable(function)
     from_callable(lambda t: (1.9 * t, 0.01 * abs(math.sin(t)), 0.0))
 
-
-# CSV files
 
 GOOD = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0,0\n0.2,0.07,0.01,0\n0.3,0.08,0.01,0\n"
 
@@ -290,7 +280,7 @@ def write(tmp_path: File) -> Callable[[str], File]:
     ids=["CRLF", "empty lines", "BOM", "spaces", "order", "offset and quotes"],
 )
 def test_formats_of_csv(write: Callable[[str], File], text: str) -> None:
-    """Line ends, spaces, quotes, a BOM and the order of columns do not matter."""
+    """Line ends, spaces, quotes, a BOM and the order of columns have no effect."""
     path = from_csv(str(write(text)))
     assert not path.closed
     assert path.duration_s == pytest.approx(0.3)
@@ -302,7 +292,7 @@ def test_formats_of_csv(write: Callable[[str], File], text: str) -> None:
 
 
 def test_a_file_that_returns_to_its_start_is_closed(write: Callable[[str], File]) -> None:
-    """Ends within 0.1 mm of each other close the path; both move to their mean."""
+    """Ends within 0.1 mm of each other are replaced by their mean."""
     rows = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0.01,0\n0.2,0.05,0.02,0\n0.3,{end},0,0\n"
     closed = from_csv(write(rows.format(end=0.05009)))
     assert closed.closed
@@ -320,14 +310,8 @@ def test_a_file_that_returns_to_its_start_is_closed(write: Callable[[str], File]
         (["0,0,0,0", "", "1,0,0"], "line 4: a row must be four finite numbers, got '1,0,0'"),
         (["0,0,0,0", "-inf,0,0,0"], "line 3: a row must be four finite numbers"),
         (["0,0,0,0", "0.2,0,0,0", "", "0.2,0,0,0"], "line 5: time must increase, .* from 0.2 s to"),
-        (
-            ["0,0,0,0", "0.1,0,0,0", "0.2,0,0,0", "0.8,0,0,0"],
-            "line 5: .* by at most five times the median step; .* from 0.2 s to 0.8 s",
-        ),
-        (
-            ["0,0,0,0", "0.1,0,0,0", "0.2,0.3,0,0"],
-            "line 4: the point moves 0.3 m in 0.1 s, .* Times must be in s, and x, y, z in m",
-        ),
+        (["0,0,0,0", "0.1,0,0,0", "0.2,0,0,0", "0.8,0,0,0"], "line 5: .* from 0.2 s to 0.8 s"),
+        (["0,0,0,0", "0.1,0,0,0", "0.2,0.3,0,0"], "line 4: the point moves 0.3 m in 0.1 s"),
         (['0,0,0,"0'], "cannot be read: unexpected end of data"),
     ],
 )
@@ -349,14 +333,11 @@ def test_files_without_the_columns_are_refused(write: Callable[[str], File]) -> 
             from_csv(unread)
 
 
-# What users give
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_mapping_has_settings_of_a_shape(kind: str) -> None:
     given = {"kind": kind, "hz": 0.5}
     assert as_path(kind) == as_path(given) == as_path(as_path(kind)) != as_path(given | {"hz": 0.4})
-    assert "kind" in given  # It is not modified.
+    assert "kind" in given  # The mapping is not modified.
     assert as_path("curve") == figure_eight(depth=0.008) != as_path("figure-eight")
 
 

@@ -1,4 +1,4 @@
-"""Postures for targets and starts, and inverse kinematics."""
+"""Random postures, torques of motions, and inverse kinematics."""
 
 from collections.abc import Callable
 
@@ -29,7 +29,7 @@ _LOW, _HIGH = JOINT_RANGE.T
 
 @pytest.mark.parametrize("draw", [draw_posture, draw_start])
 def test_postures_are_away_from_limits_and_varied(draw: Callable[..., np.ndarray]) -> None:
-    """Targets and starts are 10 % of the range from the limits."""
+    """Targets and starts are at least 10 % of the range away from each limit."""
     rng = np.random.default_rng(0)
     inner = 0.1 * (_HIGH - _LOW) - 1e-12
     postures = np.array([draw(rng) for _ in range(100)])
@@ -40,7 +40,7 @@ def test_postures_are_away_from_limits_and_varied(draw: Callable[..., np.ndarray
 
 
 def test_every_posture_of_the_range_can_be_held() -> None:
-    """The corners of the range can be held too, so drawn postures need no check."""
+    """This includes the corners of the range, so drawn postures need no check."""
     low, high = inner_range()
     shares = np.stack(np.meshgrid(*[[0.0, 0.5, 1.0]] * 4), axis=-1).reshape(-1, 4)
     for share in shares:
@@ -97,7 +97,7 @@ def test_points_of_any_posture_are_reached() -> None:
 def test_the_error_of_unreachable_points_is_correct(
     place: tuple[float, float, float], least_mm: float
 ) -> None:
-    """The reported distance is the angles', and at least the true minimum."""
+    """The returned error is the distance at the returned angles, and at least the minimum."""
     angles, off = angles_for(np.array(place))
     assert _is_within(angles)
     assert off == pytest.approx(np.linalg.norm(fingertip(angles) - place), abs=1e-12)

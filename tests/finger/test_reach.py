@@ -1,4 +1,4 @@
-"""`Finger-v1`: episodes, observations, rewards, errors, and the controller with a model."""
+"""`Finger-v1`: episodes, observations, rewards, errors, and the model-based controller."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def _state(env: FingerReachEnv) -> np.ndarray:
 
 
 def test_success_needs_ten_steps_at_the_target() -> None:
-    """Success is ten consecutive steps within 5 mm, and ends when the fingertip leaves."""
+    """Success begins after ten steps within 5 mm, and ends when the fingertip leaves."""
     env = FingerReachEnv()
     env.reset(seed=0)
     controller = FingerController(env.observation_layout)
@@ -64,7 +64,7 @@ def test_observations_match_their_names() -> None:
         assert info["distance"] == pytest.approx(np.linalg.norm(way))
 
 
-def test_effort_is_the_weighted_mean_square_of_the_tensions_over_their_limits() -> None:
+def test_effort_is_the_mean_square_of_relative_tensions() -> None:
     env = FingerReachEnv(reward={"nearness": 10.0})
     env.reset(seed=0)
     *_, info = env.step(_NOTHING)
@@ -74,7 +74,7 @@ def test_effort_is_the_weighted_mean_square_of_the_tensions_over_their_limits() 
 
 
 def test_goal_rewards_match_compute_reward() -> None:
-    """`step` and the batched `compute_reward` agree: 0 within 5 mm, else -1."""
+    """`step` and the batched `compute_reward` agree: 0 within 5 mm, otherwise -1."""
     env, plain = FingerReachEnv(goal=True), FingerReachEnv()
     numbers, _ = plain.reset(seed=4)
     parts, _ = env.reset(seed=4)
@@ -119,7 +119,7 @@ def test_invalid_actions_are_refused(action: Any, sentence: str) -> None:
 
 
 def test_options_set_start_and_target() -> None:
-    """The target is a point or angles; options left out are drawn."""
+    """The target is a point or angles; omitted options are drawn."""
     env = FingerReachEnv()
     _, info = env.reset(seed=0, options={"posture": [0.5, 0.1, 0.6, 0.3]})
     np.testing.assert_array_equal(env.plant.angles, [0.5, 0.1, 0.6, 0.3])
@@ -149,7 +149,7 @@ def test_noise_affects_observations_only() -> None:
 
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
 def test_an_episode_starts_at_rest_with_any_delay(actions: str) -> None:
-    """Until the first command acts, tendons are just taut, whatever the last episode did."""
+    """Until the first command acts, tendons are just taut, also after another episode."""
     for parameters in ({}, {"command_delay": 0.040}):
         env = FingerReachEnv(actions=actions, parameters=parameters)
         for _ in range(2):

@@ -1,4 +1,4 @@
-"""Observations of a rig in the terms of `Finger-v1`, and twins that an env serves itself."""
+"""Measurements and commands of a rig, and the arguments of its envs."""
 
 from pathlib import Path
 from typing import Any
@@ -62,17 +62,14 @@ def test_angles_follow_from_lengths_and_stretch() -> None:
     np.testing.assert_array_equal(seen.tensions, tensions)
 
 
-def test_tensions_become_shares_of_their_range_in_the_order_of_the_rig(tmp_path: Path) -> None:
-    """The pretension and less is 0, the maximum and more is 1."""
+def test_commands_are_shares_in_the_order_of_the_rig(tmp_path: Path) -> None:
+    """The pretension and lower tensions are 0; the largest and higher tensions are 1."""
     text = find_profile("finger").read_text()
     begin, end = text.index("[action.FDP]"), text.index("[action.FDS]")
     moved = text[:begin] + text[end:] + "\n" + text[begin:end]
     senses = _senses_of(read_profile(moved, tmp_path / "it.toml"))
-    for tensions, share in (
-        (np.zeros(7), 0.0),
-        (np.full(7, 99.0), 1.0),
-        (0.5 * (senses.least + senses.most), 0.5),
-    ):
+    middle = 0.5 * (senses.least + senses.most)
+    for tensions, share in ((np.zeros(7), 0.0), (np.full(7, 99.0), 1.0), (middle, 0.5)):
         np.testing.assert_allclose(senses.values(tensions), np.full(7, share), atol=1e-6)
     assert (senses.most <= MOST_TENSION_N + 1e-9).all()
     tensions = senses.least.copy()
@@ -115,8 +112,8 @@ def test_velocities_are_smoothed_differences_of_the_encoders() -> None:
     np.testing.assert_array_equal(seen.velocities, np.zeros(4))
 
 
-def test_an_encoder_that_was_not_read_keeps_its_angle() -> None:
-    """Other encoders are still updated."""
+def test_absent_measurements_keep_their_last_value() -> None:
+    """Other measurements are updated."""
     senses = _encoders()
     senses.read(_measured(JOINT_REST, MOMENT_ARMS), (), np.zeros(7))
     later = _measured(JOINT_REST + 0.1, MOMENT_ARMS)
@@ -127,7 +124,7 @@ def test_an_encoder_that_was_not_read_keeps_its_angle() -> None:
 
 
 def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
-    """A lost turn of any spool is detected with arms off by up to 20 %."""
+    """A lost turn of any spool is detected; errors of the arms of 20 % are tolerated."""
     rng = np.random.default_rng(0)
     senses, (low, high) = _encoders(), JOINT_RANGE.T
     for _ in range(300):
@@ -157,8 +154,8 @@ def test_impossible_twins_are_refused(
         gym.make("shapechanger/RemoteFinger-v1", **arguments)
 
 
-def test_geared_fingers_and_the_shipped_rig_have_the_path_of_its_profile() -> None:
-    """`finger identify --geared` assumes the values in a log of that rig."""
+def test_the_shipped_rig_has_the_path_of_its_profile() -> None:
+    """`finger identify --geared` assumes this rig."""
     rig, profile = shipped_rig(), load_profile(find_profile("finger"))
     layout = profile.action_layout()
     spans = [(layout[name].gain, layout[name].gain_unit) for name in TENDONS]

@@ -1,4 +1,4 @@
-"""Kinematics of the fingertip, the reward, and the numbers of an observation."""
+"""Forward kinematics of the fingertip, the reward, and the layout of an observation."""
 
 import mujoco
 import numpy as np
@@ -18,7 +18,7 @@ from shapechanger.finger.task import (
 )
 from tests.finger.commands import made
 
-# Any posture, joint limits exceeded.
+# Angles within and beyond the joint limits.
 _ANGLES = st.tuples(*[st.floats(-2.0, 2.0)] * 4)
 
 
@@ -48,7 +48,7 @@ def test_jacobian_matches_finite_differences(angles: tuple[float, ...]) -> None:
 
 
 def test_nearness_grows_as_the_distance_shrinks() -> None:
-    """Monotonically, fastest in the last millimetres, up to the weight per second."""
+    """Nearness grows fastest in the last millimetres, up to its weight per second."""
     distances = np.linspace(0.1, 0.0, 201)
     near = FingertipReward().terms(distances, 0.0, 0.0, 0.02)["reward_nearness"]
     gains = np.diff(near)
@@ -62,7 +62,7 @@ def test_nearness_grows_as_the_distance_shrinks() -> None:
 
 
 def test_effort_and_change_are_weighted() -> None:
-    """Costs per second; change costs nothing by default, and unknown weights are refused."""
+    """Weights are costs per second, 0 for change by default; unknown weights are refused."""
     plain = FingertipReward().terms(0.01, 0.5, 1.0, 0.02)
     assert plain["reward_effort"] == pytest.approx(-0.01)
     assert plain["reward_change"] == 0.0

@@ -1,4 +1,4 @@
-"""Constants of the finger, tensions that balance a torque, and drives of the modes of action."""
+"""Moment arms, tensions that give a torque, and drives of the modes of action."""
 
 import math
 
@@ -60,7 +60,7 @@ def _problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 @pytest.mark.parametrize("seed", range(40))
 def test_tensions_are_within_bounds(seed: int) -> None:
-    """The flag states whether the tensions give the torque; no others are nearer."""
+    """The flag states whether the tensions give the torque; otherwise they are the nearest."""
     arms, torque, low, high = _problem(seed)
     tensions, is_enough = tensions_for_torque(arms, torque, low, high)
     assert (tensions >= low - 1e-9).all()
@@ -99,7 +99,7 @@ def test_command_inverts_tension(mode: str) -> None:
 
 @pytest.mark.parametrize("mode", DRIVES)
 def test_the_model_pulls_as_the_drive(mode: str) -> None:
-    """For any command, posture and speed, the forces of MuJoCo's actuators are its tensions."""
+    """For any command, posture and speed, MuJoCo's actuators have the tensions of the drive."""
     model, drive = made(mode=mode), drive_of(mode, NOMINAL)
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     for _ in range(20):
@@ -113,7 +113,7 @@ def test_the_model_pulls_as_the_drive(mode: str) -> None:
 
 
 def test_length_commands_span_all_postures() -> None:
-    """In any posture, -1 gives the least and 1 the largest tension."""
+    """In any posture, -1 gives at most the least tension, and 1 at least the largest."""
     drive = drive_of("length", NOMINAL)
     rng = np.random.default_rng(0)
     for angles in rng.uniform(JOINT_RANGE[:, 0], JOINT_RANGE[:, 1], (50, 4)):
@@ -133,7 +133,7 @@ _FDS, _DI = 1, 5
 
 def test_moment_arms_follow_from_measured_forces() -> None:
     aside, along, across, torque = map(np.array, (_ASIDE, _ALONG, _ACROSS, _TORQUE))
-    # Two tendons exert no torque on the last joint: this gives its position relative to the tip.
+    # FDS and DI exert no torque on the last joint, which determines its position from the tip.
     y = torque[_DI] / across[_DI]
     z = (torque[_FDS] - y * across[_FDS]) / -along[_FDS]
     assert math.hypot(y, z) == pytest.approx(0.016, abs=1e-4)

@@ -1,5 +1,9 @@
-"""Visual anatomy of the finger, and the finger as an MJCF file."""
+"""Anatomy, frames and MJCF files of the finger."""
 
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
@@ -9,7 +13,13 @@ from shapechanger.finger.gap import GAPS
 from shapechanger.finger.model import TARGET, FingerFigure, build_finger, finger_mjcf
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.tensions import DRIVES, drive_of
-from shapechanger.finger.visuals import THICKEST_M, THINNEST_M, route_names
+from shapechanger.finger.visuals import (
+    TENDON_COLOURS,
+    THICKEST_M,
+    THINNEST_M,
+    route_names,
+    tendon_legend,
+)
 from tests.finger.commands import STRETCHED, at_rest, made
 
 
@@ -36,22 +46,21 @@ _INSERTIONS = dict.fromkeys(TENDONS, "distal") | {"FDS": "middle", "DI": "proxim
 
 @pytest.mark.parametrize("tendon", TENDONS)
 def test_each_tendon_ends_at_its_bone(tendon: str) -> None:
-    """Routes start in the hand, pass the bones in order and end at the insertion."""
+    """Routes start in the hand, pass the bones in order, and end at the tendon's insertion."""
     model = made(anatomy=True)
     order = ["hand", "proximal", "middle", "distal"]
     for course in route_names(tendon):
         number = model.tendon(course).id
-        places = slice(
-            model.tendon_adr[number], model.tendon_adr[number] + model.tendon_num[number]
-        )
-        sites = model.wrap_objid[places][model.wrap_type[places] == mujoco.mjtWrap.mjWRAP_SITE]
+        first = model.tendon_adr[number]
+        points = slice(first, first + model.tendon_num[number])
+        sites = model.wrap_objid[points][model.wrap_type[points] == mujoco.mjtWrap.mjWRAP_SITE]
         bodies = [order.index(model.body(model.site_bodyid[site]).name) for site in sites]
         assert bodies == sorted(bodies)
         assert (bodies[0], order[bodies[-1]]) == (0, _INSERTIONS[tendon])
 
 
 def test_routes_agree_with_the_moment_arms() -> None:
-    """Routes shorten with their fixed tendons, for arms above 2.5 mm."""
+    """For moment arms above 2.5 mm, a visible route shortens when its tendon shortens."""
     model = made(anatomy=True)
     data = mujoco.MjData(model)
     routes = [model.tendon(f"{tendon}/course").id for tendon in TENDONS]
@@ -104,8 +113,8 @@ def motion(model: mujoco.MjModel) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", FINGERS)
-def test_the_file_moves_as_the_finger_of_the_env(name: str) -> None:
-    """One second under the same commands ends in the same states, in plain MuJoCo."""
+def test_the_mjcf_file_moves_like_the_simulated_finger(name: str) -> None:
+    """States over one second of the same commands are equal."""
     parameters = FINGERS[name]
     loaded = mujoco.MjModel.from_xml_string(finger_mjcf(parameters, DRIVE))
     own = motion(build_finger(parameters, DRIVE).compile())
@@ -120,8 +129,8 @@ def numbers(parameters: FingerParameters) -> dict[str, list[float]]:
     return {name: model.numeric(name).data.tolist() for name in names}
 
 
-def test_the_file_holds_the_parameters_with_units() -> None:
-    """Numbers are exact, each has a unit, and a comment lists everything that is not simulated."""
+def test_the_mjcf_file_has_the_parameters_with_units() -> None:
+    """Numbers are exact, each has a unit, and a comment lists effects that are not simulated."""
     parameters = FINGERS["real-like"]
     found = numbers(parameters)
     assert found["moment_arms"] == parameters.arms.ravel().tolist()
@@ -133,3 +142,88 @@ def test_the_file_holds_the_parameters_with_units() -> None:
     assert all(f'name="{name}/unit"' in text for name in found)
     assert "computed at 50 Hz, sent at 100 Hz, with a slew of 20 up and 20 down" in text
     assert "path of a command" not in finger_mjcf(NOMINAL, DRIVE)
+
+
+_SIZE = {"width": 160, "height": 120}
+
+
+@pytest.fixture
+def finger() -> Iterator[Any]:
+    """A finger env that renders frames."""
+    with gym.make("shapechanger/Finger-v1", render_mode="rgb_array", **_SIZE) as env:
+        env.reset(seed=0, options={"posture": JOINT_REST.tolist()})
+        yield env
+
+
+def _differs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the pixels that differ by more than rounding."""
+    return np.any(np.abs(one.astype(int) - other.astype(int)) > 4, axis=2)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_frame_shows_posture_and_target_of_the_finger(finger: Any) -> None:
+    """Frames have the requested size, a light border, and a dark finger."""
+    frame = finger.render()
+    assert (frame.shape, frame.dtype) == ((120, 160, 3), np.uint8)
+    border = np.concatenate([frame[0], frame[-1], frame[:, 0], frame[:, -1]])
+    assert border.min() > 190
+    assert 0.03 < (frame.min(axis=2) < 180).mean() < 0.4
+    np.testing.assert_array_equal(finger.render(), frame)
+    for _ in range(2):
+        finger.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
+    assert _differs(finger.render(), frame).mean() > 0.005
+    frames = []
+    for target in ((0.07, 0.0, -0.02), (0.03, 0.0, -0.06)):
+        finger.reset(seed=0, options={"posture": JOINT_REST.tolist(), "target": target})
+        frames.append(finger.render())
+    assert 0.001 < _differs(*frames).mean() < 0.1
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_rendering_does_not_change_the_episode() -> None:
+    """Observations with and without rendering are equal."""
+    found = []
+    for mode in (None, "rgb_array"):
+        with gym.make("shapechanger/Finger-v1", render_mode=mode, **_SIZE) as env:
+            env.reset(seed=3)
+            rng = np.random.default_rng(0)
+            seen = []
+            for _ in range(5):
+                seen.append(env.step(rng.uniform(-1, 1, 7).astype(np.float32))[0])
+                env.render()
+                if mode:
+                    env.unwrapped.picture(64, 48)
+            found.append(np.array(seen))
+    np.testing.assert_array_equal(*found)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_picture_shows_the_whole_finger_and_no_target(finger: Any) -> None:
+    pictures = []
+    for target in ((0.07, 0.0, -0.02), (0.03, 0.0, -0.06)):
+        finger.reset(seed=0, options={"posture": JOINT_REST.tolist(), "target": target})
+        pictures.append(finger.unwrapped.picture(**_SIZE))
+    np.testing.assert_array_equal(*pictures)
+    dark = pictures[0].min(axis=2) < 190
+    assert dark.mean() > 0.01
+    assert not np.concatenate([dark[0], dark[-1], dark[:, 0], dark[:, -1]]).any()
+    assert np.ptp(np.flatnonzero(dark.any(axis=0))) > 0.25 * 160
+
+
+def test_the_legend_shows_tensions() -> None:
+    """Bars in the colours of the tendons grow with the tension; small frames have no bars."""
+    frame = np.full((360, 480, 3), 230, np.uint8)
+    slack, taut = (tendon_legend(frame, np.full(7, pulled)) for pulled in (0.0, 1.0))
+    assert slack.shape == frame.shape
+    for colour in TENDON_COLOURS.values():
+        paint = np.round(255 * np.array(colour))
+        drawn = [int((one == paint).all(axis=2).sum()) for one in (slack, taut)]
+        assert drawn[1] > 20 * drawn[0]
+        assert drawn[1] > 200
+    assert (taut[45:] == 230).all()  # The legend leaves room for the finger.
+    assert (frame == 230).all()
+    small = frame[:120, :160]
+    assert tendon_legend(small, np.ones(7)) is small

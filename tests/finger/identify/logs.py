@@ -44,14 +44,9 @@ def swings(t: np.ndarray) -> np.ndarray:
 def synthetic(
     arms: np.ndarray, compliance: float, joint_noise: float, length_noise: float, rows: int = 400
 ) -> FingerLog:
-    """Return a log whose lengths follow from the kinematic model, with noisy angles.
+    """Return a log whose lengths follow from the kinematic model.
 
-    Args:
-        arms: Moment arms, m, (7, 4).
-        compliance: Stretch per newton, m/N.
-        joint_noise: Standard deviation of the angles, rad.
-        length_noise: Standard deviation of the lengths, m.
-        rows: Length of the log.
+    `arms` are in m, (7, 4), the compliance in m/N; noises are standard deviations, rad and m.
     """
     rng = np.random.default_rng(7)
     t = 0.02 * np.arange(rows, dtype=np.float64)

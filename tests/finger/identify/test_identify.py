@@ -9,29 +9,14 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from shapechanger.finger import report
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.gap import GAPS, with_gears
-from shapechanger.finger.identify import (
-    FingerLog,
-    IdentifiedFinger,
-    ParameterEstimate,
-    identify,
-    result,
-)
+from shapechanger.finger.identify import FingerLog, IdentifiedFinger, identify, result
 from shapechanger.finger.identify.kinematics import ARMS, Kinematics, interval_quantile
 from shapechanger.finger.identify.motion import FACTORS, Motors, cut_windows
-from shapechanger.finger.identify.result import replay
+from shapechanger.finger.identify.result import ParameterEstimate, replay
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
-from shapechanger.finger.report import (
-    arm_cell,
-    finger_html,
-    interval,
-    label,
-    number,
-    summary_line,
-    unbounded,
-    unknown,
-)
 from tests.finger.identify.logs import made_up, recorded
 
 
@@ -51,7 +36,7 @@ def quick() -> tuple[FingerLog, FingerParameters, IdentifiedFinger, tuple[str, .
 
 
 def test_a_finger_is_identified() -> None:
-    """Arms, joints, friction, motors and motion of a finger without noise are found."""
+    """The true parameters of a finger without noise are found, and its motion is predicted."""
     log, truth, found, steps = quick()
     np.testing.assert_allclose(found.parameters.arms, truth.arms, rtol=0.01)
     assert found.parameters.tendon_stiffness is None
@@ -67,14 +52,14 @@ def test_a_finger_is_identified() -> None:
     assert found.held_out.t[-1] == pytest.approx(found.seconds)
     assert (found.source, found.seconds) == (log.source, log.seconds)
     assert len(steps) == 4
-    page = unescape(finger_html(found, "finger.npz"))
+    page = unescape(report.finger_html(found, "finger.npz"))
     assert page.count("<img") == 5
-    assert dict(unknown(found)).keys() == {"tendon_stiffness"}
-    assert all(why in page for _, why in unknown(found))
+    assert dict(report.unknown(found)).keys() == {"tendon_stiffness"}
+    assert all(why in page for _, why in report.unknown(found))
 
 
 def test_intervals_contain_the_truth() -> None:
-    """Intervals contain the true values; the arms' exclude the nominal ones."""
+    """Intervals contain the true values, and intervals of the arms exclude the nominal arms."""
     _, truth, found, _ = quick()
     by_name = {e.name: e for e in found.estimates}
     for j, joint in enumerate(JOINTS):
@@ -120,9 +105,9 @@ def estimates(
 
 
 def test_intervals_follow_from_standard_errors() -> None:
-    """Half-widths are the standard errors, model and clock errors included, times the quantile."""
+    """Half widths are the quantile times the standard errors, which include model errors."""
     found, reach = estimates(), interval_quantile(300, 0.02)
-    # On a rig tensions reveal friction; play and sticking of the gears add to the arms' errors.
+    # On a rig, tensions reveal friction, and the gears increase errors of arms.
     rig = estimates(rig=NOMINAL.replace(path=CommandPath()))
     arm = "moment_arms/FDP/MCP_flexion"
     for e, error in (
@@ -150,11 +135,11 @@ def test_intervals_follow_from_standard_errors() -> None:
 
 
 def test_stiffness_has_the_interval_of_its_inverse() -> None:
-    """The upper end is infinite where the compliance is not clearly above zero."""
+    """The upper end is infinite if the compliance is not clearly above zero."""
     reach = interval_quantile(300, 0.02)
     e = estimates()["tendon_stiffness"]
     assert e.value == pytest.approx(1e4)
-    half = reach * math.hypot(1e-5, 0.02 * 1e-4)  # With 2 % for what the fit lacks.
+    half = reach * math.hypot(1e-5, 0.02 * 1e-4)  # The model error is 2 %.
     assert e.low == pytest.approx(1.0 / (1e-4 + half))
     assert e.high == pytest.approx(1.0 / (1e-4 - half))
     assert e.differs
@@ -175,7 +160,7 @@ def test_stiffness_has_the_interval_of_its_inverse() -> None:
 
 
 def test_fitted_values_become_parameters() -> None:
-    """Joints, friction, motors and noise are set; other parameters stay nominal or as known."""
+    """Joints, friction, motors and noise are fitted; other parameters stay nominal."""
     found = result._parameters(kinematics(0.0, 1e-6, 0.02), MOTORS, DYNAMICS, None)
     assert found.moment_arms == NOMINAL.moment_arms
     assert found.joint_stiffness == tuple(2.0 * v for v in NOMINAL.joint_stiffness)
@@ -201,7 +186,7 @@ def test_undetermined_parameters_are_listed() -> None:
 
 
 @pytest.mark.parametrize("stiffness", [None, 2e4])
-def test_replay_of_the_true_finger_repeats_its_motion(stiffness: float | None) -> None:
+def test_replay_of_the_true_finger_repeats_the_motion(stiffness: float | None) -> None:
     """A replay of one second stays within a degree, with stiff and with elastic tendons."""
     true = NOMINAL.replace(tendon_stiffness=stiffness, command_delay=0.02)
     log, _ = recorded(2.0, parameters=true)
@@ -216,7 +201,7 @@ def test_replay_of_the_true_finger_repeats_its_motion(stiffness: float | None) -
 
 
 def test_unbounded_intervals_are_unknown() -> None:
-    """An open side, or more than the range of fingers, reads "unknown" with the reason."""
+    """An infinite interval, or one wider than the range of fingers, is shown as "unknown"."""
     found, stretch = estimates(1e-5, 1e-5), "tendon_stiffness"
     stiffness, arm = found["joint_stiffness/PIP_flexion"], found["moment_arms/FDP/MCP_flexion"]
     for e, why in (
@@ -225,18 +210,18 @@ def test_unbounded_intervals_are_unknown() -> None:
         (found["tendon_friction"], "the 3 N by which fingers differ"),
         (dataclasses.replace(stiffness, high=1.0), "60 mN·m/rad"),
     ):
-        assert interval(e) == "unknown"
-        assert why in unbounded(e)
-    assert unbounded(stiffness) == ""
-    assert interval(estimates()[stretch]) == "8.16 to 12.9"
-    assert arm_cell(arm) == "8.60 ±0.22"
-    assert arm_cell(dataclasses.replace(arm, nominal=0.0)) == "8.60 ±0.22*"
-    assert arm_cell(dataclasses.replace(arm, high=0.03)) == "unknown"
+        assert report.interval(e) == "unknown"
+        assert why in report.unbounded(e)
+    assert report.unbounded(stiffness) == ""
+    assert report.interval(estimates()[stretch]) == "8.16 to 12.9"
+    assert report.arm_cell(arm) == "8.60 ±0.22"
+    assert report.arm_cell(dataclasses.replace(arm, nominal=0.0)) == "8.60 ±0.22*"
+    assert report.arm_cell(dataclasses.replace(arm, high=0.03)) == "unknown"
 
 
 @pytest.mark.slow
 def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
-    """An env takes the identified finger, and the page shows every number."""
+    """Intervals contain most true values, and the page shows all numbers."""
     log, truth = recorded(10.0, seed=2, gap="real-like", finger_seed=5)
     found = identify(log)
     ends, passed = found.arm_intervals, truth.arms != 0.0
@@ -249,12 +234,17 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
     for j, joint in enumerate(JOINTS):
         low, high = intervals[f"joint_stiffness/{joint}"]
         assert low < truth.joint_stiffness[j] < high
-    page = unescape(finger_html(found, "finger.npz"))
+    page = unescape(report.finger_html(found, "finger.npz"))
     for e in found.estimates:
-        if e not in found.arms:  # They are in the chart.
-            assert all(text in page for text in (label(e), interval(e), number(e, e.value)))
+        if e not in found.arms:  # Arms are in the chart.
+            assert all(
+                text in page
+                for text in (report.label(e), report.interval(e), report.number(e, e.value))
+            )
     assert all(name in page and why in page for name, why in found.undetermined)
-    assert summary_line(found).startswith("arms: 25 intervals, the widest of those above 2 mm ±")
+    assert report.summary_line(found).startswith(
+        "arms: 25 intervals, the widest of those above 2 mm ±"
+    )
     with gym.make("shapechanger/Finger-v1", parameters=found.parameters.to_json()) as env:
         env.reset(seed=0)
         observation, *_ = env.step(np.zeros(7, np.float32))
@@ -262,7 +252,7 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
 
 
 def test_a_delay_on_a_path_follows_from_the_motion() -> None:
-    """Tensions hide it within a period; the log says by itself that it is a rig's."""
+    """The log contains the motors of the rig; tensions do not show delays below a period."""
     path = CommandPath(slew_per_s=20.0, slew_down_per_s=20.0)
     drawn = with_gears(GAPS["real-like"].draw(np.random.default_rng(1)))
     late = drawn.replace(path=path, command_delay=0.008, joint_noise=0.0)
@@ -272,7 +262,6 @@ def test_a_delay_on_a_path_follows_from_the_motion() -> None:
     found = identify(log)
     assert found.parameters.path == path
     assert found.parameters.command_delay == pytest.approx(0.008, abs=0.007)
-    names = [e.name for e in found.estimates]
-    assert "command_delay" in names
-    assert "motor_lag" not in names
+    names = {e.name for e in found.estimates}
+    assert names & {"command_delay", "motor_lag"} == {"command_delay"}
     assert "motor_lag" in dict(found.undetermined)

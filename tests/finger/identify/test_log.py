@@ -1,4 +1,4 @@
-"""Finger logs: babbling of joints, validation and files."""
+"""Finger logs: validation, files, and recordings of random motion."""
 
 import json
 import math
@@ -22,7 +22,7 @@ from tests.finger.identify.logs import changed, made_up, recorded
 
 
 def test_a_log_round_trips(tmp_path: Path) -> None:
-    """All signals and names are kept."""
+    """All signals and settings are kept."""
     log = changed(made_up(), source="finger of the third shelf", actions="tension")
     save_log(log, tmp_path / "log")
     back = load_log(tmp_path / "log")
@@ -85,11 +85,7 @@ def knuckle(degrees: float) -> FingerLog:
     ids=["duration", "range", "independence"],
 )
 def test_limits_of_informative_logs(enough: FingerLog, less: FingerLog, sentence: str) -> None:
-    """A log must last 4 s, less half a period, and move each joint over 10 degrees.
-
-    The part of a joint's motion that other joints do not explain must have a standard deviation of
-    at least 2 degrees.
-    """
+    """A log must last 4 s, and move each joint over 10 degrees, by 2 degrees on its own."""
     require_informative(enough)
     with pytest.raises(FingerError, match=sentence):
         identify(less)
@@ -114,7 +110,7 @@ def test_files_that_are_no_logs_are_refused(tmp_path: Path) -> None:
             load_log(one)
     with pytest.raises(OutputError, match="cannot be written"):
         save_log(made_up(), tmp_path)
-    os.mkfifo(pipe)  # Without a writer, which would be waited for.
+    os.mkfifo(pipe)  # Opening a pipe without a writer would block.
     for one in (pipe, Path(os.devnull)):
         with pytest.raises(FingerError, match="cannot be read: it is not a regular file"):
             load_log(one)
@@ -131,14 +127,14 @@ def test_files_that_are_no_logs_are_refused(tmp_path: Path) -> None:
         zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
         archive.open("t.npy", "w", force_zip64=True) as file,
     ):
-        for _ in range(300):  # 300 kilobytes that hold 300 megabytes.
+        for _ in range(300):  # 300 kilobytes that unpack to 300 megabytes.
             file.write(bytes(1 << 20))
     with pytest.raises(FingerError, match="unpacks to 314572800 bytes"):
         load_log(path)
 
 
 def rewritten(path: Path, header: dict[str, Any], arrays: dict[str, Any]) -> None:
-    """Write a log with changes of its header and arrays; None drops one."""
+    """Write a log with changed fields of its header and arrays; None removes a field or array."""
     save_log(made_up(), path)
     with np.load(path) as read:
         kept = {name: read[name] for name in read.files}
@@ -172,7 +168,7 @@ def test_other_archives_are_refused(
         load_log(path)
 
 
-def test_a_log_of_an_old_version_knows_no_motors(tmp_path: Path) -> None:
+def test_motors_are_optional_in_a_file(tmp_path: Path) -> None:
     path = tmp_path / "log.npz"
     rewritten(path, {"motors": None}, {})
     assert load_log(path).motors is None
@@ -181,10 +177,7 @@ def test_a_log_of_an_old_version_knows_no_motors(tmp_path: Path) -> None:
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
 @pytest.mark.parametrize("finger_seed", [0, 7])
 def test_every_joint_moves_far_and_on_its_own(actions: str, finger_seed: int) -> None:
-    """Joints cover half of their range, and move as independently as the hood allows.
-
-    A rig extends the knuckle with 14 N against flexors and stiff tissue: it covers a third.
-    """
+    """Joints cover half of their range, the knuckle a third, and move independently."""
     log, _ = recorded(10.0, gap="real-like", finger_seed=finger_seed, actions=actions)
     low, high = np.percentile(log.angles, [5.0, 95.0], axis=0)
     share = (high - low) / (JOINT_RANGE[:, 1] - JOINT_RANGE[:, 0])
@@ -219,6 +212,6 @@ def test_the_seed_determines_the_motion() -> None:
 def test_envs_that_give_no_log_are_refused(
     env: tuple[str, dict[str, Any]], error: type[Exception], text: str
 ) -> None:
-    """Goals, an env without names and one that ends too early are refused with the reason."""
+    """Goals, an env without layouts, and an env that ends too early are refused."""
     with gym.make(env[0], **env[1]) as made, pytest.raises(error, match=text):
         record_babble(made, 3.0)

@@ -1,4 +1,4 @@
-"""Joints, friction and motors from motion and commands."""
+"""The three fits: motors from commands, joints and friction from motion, arms from lengths."""
 
 import dataclasses
 import functools
@@ -9,7 +9,13 @@ import pytest
 
 from shapechanger.errors import MissingExtra
 from shapechanger.finger.anatomy import JOINTS
-from shapechanger.finger.identify.kinematics import ARMS, Kinematics
+from shapechanger.finger.identify.kinematics import (
+    ARMS,
+    Kinematics,
+    fit_kinematics,
+    interval_quantile,
+    robust_covariance,
+)
 from shapechanger.finger.identify.log import FingerLog
 from shapechanger.finger.identify.motion import (
     FACTORS,
@@ -22,7 +28,7 @@ from shapechanger.finger.identify.motion import (
     with_motors,
 )
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
-from tests.finger.identify.logs import changed, made_up, recorded
+from tests.finger.identify.logs import changed, made_up, recorded, swings, synthetic
 
 ARM_SD_M = 2e-4
 
@@ -81,7 +87,7 @@ def test_windows_begin_in_the_measured_state() -> None:
         ahead, back = log.angles[row + 1], log.angles[row - 1]
         np.testing.assert_allclose(window.velocities, (ahead - back) / (2 * dt), atol=0.5)
         assert np.corrcoef(window.velocities, (ahead - back) / (2 * dt))[0, 1] > 0.99
-        # Within the recent commands, because of delay and lag.
+        # Delay and lag keep the activations within the range of the recent commands.
         acting = log.commands[max(row - 4, 0) : row + 1]
         assert (acting.min(axis=0) - 1e-3 <= window.activations).all()
         assert (window.activations <= acting.max(axis=0) + 1e-3).all()
@@ -102,8 +108,8 @@ def test_known_motors_take_precedence() -> None:
 
 
 def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An empty `mujoco.sysid`, as without its dependencies, raises MissingExtra."""
-    log, kinematics = short()[0], exact()  # Their env is imported before the patch.
+    """Without its dependencies, `mujoco.sysid` is an empty module."""
+    log, kinematics = short()[0], exact()  # These import the env, so they precede the patch.
     monkeypatch.setattr(importlib, "import_module", lambda name: object())
     with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
         fit_dynamics(log, kinematics, motors())
@@ -116,7 +122,7 @@ def stepped() -> CommandSignal:
 
 
 def test_a_command_acts_in_the_period_that_ends_with_its_row() -> None:
-    """A command acts from 0.98 s plus the delay on, and partly in the step in between."""
+    """The step acts from 0.98 s plus the delay on; in a partial step, the mean is returned."""
     late = stepped().delayed(0.96, 0.01, 6, 0.0)
     np.testing.assert_allclose(late[:, 0], [0, 0, 1, 1, 1, 1], atol=1e-9)
     late = stepped().delayed(0.96, 0.01, 6, 0.025)
@@ -154,3 +160,50 @@ def test_lag_and_delay_are_found(actions: str) -> None:
     assert found.saturates
     assert found.strength == pytest.approx(0.9, abs=0.02)
     assert found.tension_noise == pytest.approx(0.2, rel=0.2)
+
+
+LARGE_M = 2e-3
+
+
+def test_synthetic_logs_give_their_parameters() -> None:
+    """Arms, compliance and noise are found, and noise of the angles does not bias the arms."""
+    arms, noise = 1.15 * NOMINAL.arms, np.radians(1.5)
+    log = synthetic(arms, compliance=5e-5, joint_noise=noise, length_noise=2e-5)
+    found = fit_kinematics(log)
+    large = np.abs(arms) > LARGE_M
+    np.testing.assert_allclose(found.arms[large], arms[large], rtol=0.03)
+    assert (found.arms[~ARMS] == 0.0).all()
+    assert found.compliance == pytest.approx(5e-5, rel=0.05)
+    assert 1e-7 < found.compliance_sd < 2.5e-6
+    np.testing.assert_allclose(found.joint_noise, noise, rtol=0.1)
+    # Lengths also determine the angles, which removes most of their noise.
+    assert np.std(found.angles - swings(log.t)) < 0.5 * noise
+
+
+def test_slack_and_the_start_of_a_log_are_outliers() -> None:
+    """Slack of 5 mm for 0.5 s, and errors in the first 0.2 s, do not bias arms or intervals."""
+    log = synthetic(NOMINAL.arms, 0.0, np.radians(1.0), 2e-5)
+    lengths = log.lengths.copy()
+    lengths[:9] += 0.02
+    lengths[100:125, 0] += 5e-3
+    found = fit_kinematics(changed(log, lengths=lengths))
+    large = np.abs(NOMINAL.arms) > LARGE_M
+    np.testing.assert_allclose(found.arms[large], NOMINAL.arms[large], rtol=0.05)
+    ratio = (found.arms - NOMINAL.arms)[ARMS] / found.arms_sd[ARMS]
+    assert 1.0 / 1.5 < np.sqrt(np.mean(ratio**2)) < 1.5
+    assert len(found.angles) == len(log)
+
+
+def test_the_covariance_has_newey_west_weights() -> None:
+    """Lag k of L steps has the weight 1 - k / (L + 1), with L half a second."""
+    residual = np.array([[1.0], [2.0], [-1.0], [3.0]])
+    # Two lags of 0.25 s: 1 + 4 + 1 + 9, + 2 (2/3) (2 - 2 - 3), + 2 (1/3) (-1 + 6); over 4 squared.
+    expected = (15.0 - 2.0 * (2.0 / 3.0) * 3.0 + 2.0 * (1.0 / 3.0) * 5.0) / 16.0
+    assert robust_covariance(np.ones((4, 1, 1)), residual, 0.25)[0, 0] == pytest.approx(expected)
+
+
+def test_intervals_are_wider_for_short_logs() -> None:
+    """The quantile is Kiefer and Vogelsang's cubic in the bandwidth."""
+    assert interval_quantile(10**9, 0.02) == pytest.approx(1.96, abs=1e-4)
+    assert interval_quantile(250, 0.02) == pytest.approx(1.96 + 0.29694 + 0.00416 - 0.0005324)
+    assert interval_quantile(5, 0.02) == pytest.approx(1.96 + 2.9694 + 0.4160 - 0.5324)
