@@ -35,7 +35,6 @@ def test_postures_are_away_from_limits_and_varied(draw: Callable[..., np.ndarray
     postures = np.array([draw(rng) for _ in range(100)])
     assert (postures >= _LOW + inner).all()
     assert (postures <= _HIGH - inner).all()
-    assert all(can_hold(posture) for posture in postures)
     assert (np.ptp(postures, axis=0) > 0.1).all()
 
 
@@ -72,8 +71,8 @@ def _is_within(angles: np.ndarray) -> bool:
     return bool(((angles >= _LOW) & (angles <= _HIGH)).all())
 
 
-def test_points_of_any_posture_are_reached() -> None:
-    """Fingertips of all postures within the joint limits are reached."""
+def test_the_fingertip_of_any_posture_is_reached() -> None:
+    """A quarter of the postures are at the joint limits."""
     rng = np.random.default_rng(1)
     postures = rng.uniform(_LOW, _HIGH, (80, 4))
     postures[::4] = np.where(rng.random((20, 4)) < 0.5, _LOW, _HIGH)

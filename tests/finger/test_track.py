@@ -2,7 +2,6 @@
 
 import math
 import re
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -79,18 +78,6 @@ def test_a_path_that_is_too_fast_is_refused() -> None:
     with pytest.raises(PathError, match=r"too weak .* at \d.\d\d s a joint lacks"):
         FingerTrackEnv(path={"kind": "circle", "hz": 8.0})
     require_reachable(circle(hz=1.3))
-
-
-def test_a_file_can_be_followed(tmp_path: File) -> None:
-    """The target follows the file and stays at its last point."""
-    file = tmp_path / "tip.csv"
-    file.write_text("t,x,y,z\n0,0.045,0,-0.045\n0.75,0.0525,0,-0.045\n1.5,0.060,0,-0.045\n")
-    env = FingerTrackEnv(path=str(file))
-    _, info = env.reset(seed=5)
-    np.testing.assert_allclose(info["target"], [0.045, 0.0, -0.045], atol=1e-9)
-    for _ in range(80):
-        _, _, _, _, info = env.step(_NOTHING)
-    np.testing.assert_allclose(info["target"], [0.060, 0.0, -0.045], atol=1e-9)
 
 
 def test_another_path_can_be_given_at_a_reset() -> None:

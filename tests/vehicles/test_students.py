@@ -1,5 +1,6 @@
 """Camera policies that learn from a teacher with distances."""
 
+import functools
 from pathlib import Path
 
 import msgspec
@@ -22,24 +23,20 @@ _TINY = PpoSettings(
 )  # fmt: skip
 
 
+@functools.cache
 def _teacher(vehicle: str = "Car") -> TrainedPolicy:
+    """Return a barely trained teacher."""
     env = EnvRef(f"shapechanger/{vehicle}Ranges-v1", {"courses": [0, 1]})
     return Sb3Learner("tiny", _TINY).train(env, 8, 0, on_evaluation=lambda _: None)
 
 
-@pytest.fixture(scope="module")
-def teacher() -> TrainedPolicy:
-    """A barely trained teacher."""
-    return _teacher()
-
-
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_a_student_learns_from_images(teacher: TrainedPolicy, tmp_path: Path) -> None:
+def test_a_student_learns_from_images(tmp_path: Path) -> None:
     """The saved policy acts on images, and its card names the teacher's env."""
     quick = msgspec.structs.replace(STUDENT_CLONING, fewest_steps=20, most_steps=20)
     done: list[int] = []
-    policy = train_student(_CAR, teacher, 24, 3, settings=quick, on_steps=done.append)
+    policy = train_student(_CAR, _teacher(), 24, 3, settings=quick, on_steps=done.append)
     assert done == [8, 16, 24]
     assert policy.card.data["teacher"] == "shapechanger/CarRanges-v1"
     assert policy.card.steps == 24
@@ -51,12 +48,12 @@ def test_a_student_learns_from_images(teacher: TrainedPolicy, tmp_path: Path) ->
     assert 0.25 <= action[1] < 0.5
 
 
-def test_unsuitable_teachers_are_refused(teacher: TrainedPolicy) -> None:
+def test_unsuitable_teachers_are_refused() -> None:
     """Policies of other envs, envs without teachers and too few steps are refused."""
     for env, steps, given, text in (
         (_CAR, 10, _teacher("Tank"), "A teacher for shapechanger/Car-v1 is a policy of"),
-        (EnvRef("shapechanger/CarRanges-v1"), 10, teacher, "CarRanges-v1 has no teachers"),
-        (_CAR, 2, teacher, "at least 3 steps, got 2"),
+        (EnvRef("shapechanger/CarRanges-v1"), 10, _teacher(), "CarRanges-v1 has no teachers"),
+        (_CAR, 2, _teacher(), "at least 3 steps, got 2"),
     ):
         with pytest.raises(StudyError, match=text):
             train_student(env, given, steps, 0)

@@ -1,23 +1,15 @@
 """Parts, motors, steering and motion of each kind of vehicle, and the counting of collisions."""
 
 import math
-from collections.abc import Callable
-from functools import partial
 
 import mujoco
 import pytest
 
-from shapechanger.errors import ProfileError, UnknownName
-from shapechanger.vehicles.bodies import add_vehicle, require_fit, vehicle_model
+from shapechanger.errors import ProfileError
+from shapechanger.vehicles.bodies import require_fit
 from shapechanger.vehicles.bodies.model import APART_S, BUMPER_SPREAD, ContactTracker, Motion
 from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR
 from tests.vehicles.bodies.grounds import TO_THE_LEFT, Ground, ground
-
-
-@pytest.mark.parametrize("make", [vehicle_model, partial(add_vehicle, mujoco.MjSpec())])
-def test_an_unknown_name_is_refused(make: Callable[[str], object]) -> None:
-    with pytest.raises(UnknownName, match=r"Did you mean 'truck'\?"):
-        make("truk")
 
 
 @pytest.mark.parametrize(

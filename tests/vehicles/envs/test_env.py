@@ -237,9 +237,7 @@ def test_options_do_not_change_other_draws() -> None:
     [
         ({"curse": 1}, "No option of reset matches 'curse'. Did you mean 'course'"),
         ({"course": "a"}, "The seed of a course must be a whole number from 0, got 'a'"),
-        ({"course": -1}, "The seed of a course must be a whole number from 0, got -1"),
         ({"start": -1}, "The seed of a start must be a whole number from 0, got -1"),
-        ({"start": True}, "The seed of a start must be a whole number from 0, got True"),
     ],
 )
 def test_invalid_options_are_refused(options: dict[str, Any], sentence: str) -> None:
