@@ -5,13 +5,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from shapechanger.finger.anatomy import (
-    JOINT_REST,
-    JOINTS,
-    LEAST_TENSION_N,
-    MOMENT_ARMS,
-    MOST_TENSION_N,
-)
+from shapechanger.finger import anatomy
 from shapechanger.finger.model import build_finger
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.postures import moving_torque
@@ -26,7 +20,9 @@ STRETCHED = NOMINAL.replace(
 def can_hold(angles: np.ndarray) -> bool:
     """Return whether feasible tensions hold the nominal finger at these angles, rad, (4,)."""
     torque = moving_torque(angles, np.zeros(4), np.zeros(4))
-    return tensions_for_torque(MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N)[1]
+    return tensions_for_torque(
+        anatomy.MOMENT_ARMS, torque, anatomy.LEAST_TENSION_N, anatomy.MOST_TENSION_N
+    )[1]
 
 
 def made(
@@ -39,9 +35,11 @@ def made(
 def at_rest(model: mujoco.MjModel, parameters: FingerParameters = NOMINAL) -> mujoco.MjData:
     """Return a state in the resting posture with taut tendons."""
     data = mujoco.MjData(model)
-    data.qpos[: len(JOINTS)] = JOINT_REST
+    data.qpos[: len(anatomy.JOINTS)] = anatomy.JOINT_REST
     if parameters.gives:
-        data.qpos[len(JOINTS) :] = parameters.arms @ JOINT_REST + parameters.backlash
+        data.qpos[len(anatomy.JOINTS) :] = (
+            parameters.arms @ anatomy.JOINT_REST + parameters.backlash
+        )
     data.ctrl[:] = data.act[:] = -1.0
     return data
 

@@ -4,15 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.finger.anatomy import (
-    DIP_BY_PIP,
-    END_STIFFNESS,
-    JOINT_RANGE,
-    JOINT_REST,
-    JOINTS,
-    LEAST_TENSION_N,
-    TENDONS,
-)
+from shapechanger.finger import anatomy
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.model import HOOD, SIM_DT
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
@@ -36,7 +28,7 @@ _ANATOMY = {
 }
 
 
-@pytest.mark.parametrize("tendon", TENDONS)
+@pytest.mark.parametrize("tendon", anatomy.TENDONS)
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
 def test_each_tendon_moves_its_joints(parameters: FingerParameters, tendon: str) -> None:
     model = made(parameters)
@@ -44,10 +36,10 @@ def test_each_tendon_moves_its_joints(parameters: FingerParameters, tendon: str)
     ends: list[np.ndarray] = []
     for pulled in (-1.0, 1.0):
         data = at_rest(model, parameters)
-        data.ctrl[TENDONS.index(tendon)] = pulled
+        data.ctrl[anatomy.TENDONS.index(tendon)] = pulled
         mujoco.mj_step(model, data, round((0.08 + parameters.command_delay) / model.opt.timestep))
         ends.append(np.degrees(data.qpos[:4]))
-    moved: dict[str, float] = dict(zip(JOINTS, ends[1] - ends[0], strict=True))
+    moved: dict[str, float] = dict(zip(anatomy.JOINTS, ends[1] - ends[0], strict=True))
     assert all(sign * moved[joint] > 1.0 for joint, sign in _ANATOMY[tendon].items()), moved
 
 
@@ -62,7 +54,7 @@ def test_extreme_commands_are_stable(finger: str, mode: str) -> None:
     assert (model.opt.timestep == SIM_DT) == (not parameters.gives)
     steps = round(0.02 / model.opt.timestep)
     most = np.array(parameters.most_tension)
-    low, high = JOINT_RANGE.T
+    low, high = anatomy.JOINT_RANGE.T
     for name, commands in harsh_commands(np.random.default_rng(0)):
         data = at_rest(model, parameters)
         for command in commands:
@@ -75,7 +67,7 @@ def test_extreme_commands_are_stable(finger: str, mode: str) -> None:
                 assert np.abs(data.qvel[:4]).max() < _FASTEST, name
                 # Actuator forces are negative for stiff tendons and positive for spools.
                 tensions = data.actuator_force * (1.0 if parameters.gives else -1.0)
-                assert (tensions >= LEAST_TENSION_N - 1e-12).all(), name
+                assert (tensions >= anatomy.LEAST_TENSION_N - 1e-12).all(), name
                 assert (tensions <= most + 1e-12).all(), name
         assert not any(warning.number for warning in data.warning), name
 
@@ -87,7 +79,7 @@ def test_tendons_are_slack_within_the_backlash() -> None:
     data = at_rest(model, parameters)
     data.qpos[4:] -= 1e-3
     mujoco.mj_forward(model, data)
-    stretch = [model.tendon(f"{name}/stretch").id for name in TENDONS]
+    stretch = [model.tendon(f"{name}/stretch").id for name in anatomy.TENDONS]
     assert (data.ten_length[stretch] < parameters.backlash).all()
     np.testing.assert_array_equal(data.qfrc_spring[4:], 0.0)
     data.qpos[4:] += 2e-3
@@ -99,19 +91,19 @@ def test_joints_stiffen_towards_the_ends_of_their_ranges() -> None:
     """A joint is four times as stiff at the farther end of its range as at rest."""
     model, data = made(), mujoco.MjData(made())
     model.tendon_stiffness[model.tendon(HOOD).id] = 0.0
-    for j, (low, high) in enumerate(JOINT_RANGE):
-        farther = max((low, high), key=lambda end: abs(end - JOINT_REST[j]))
+    for j, (low, high) in enumerate(anatomy.JOINT_RANGE):
+        farther = max((low, high), key=lambda end: abs(end - anatomy.JOINT_REST[j]))
         stiffness = []
-        for angle in (JOINT_REST[j], farther):
+        for angle in (anatomy.JOINT_REST[j], farther):
             torques = []
             for side in (-1e-4, 1e-4):
-                data.qpos[:] = JOINT_REST
+                data.qpos[:] = anatomy.JOINT_REST
                 data.qpos[j] = angle + side
                 mujoco.mj_forward(model, data)
                 torques.append(data.qfrc_spring[j])
             stiffness.append((torques[0] - torques[1]) / 2e-4)
         assert stiffness[0] == pytest.approx(NOMINAL.joint_stiffness[j], rel=1e-6)
-        assert stiffness[1] == pytest.approx(END_STIFFNESS * stiffness[0], rel=1e-6)
+        assert stiffness[1] == pytest.approx(anatomy.END_STIFFNESS * stiffness[0], rel=1e-6)
 
 
 def test_the_hood_couples_the_end_joint() -> None:
@@ -122,6 +114,6 @@ def test_the_hood_couples_the_end_joint() -> None:
         data = at_rest(model)
         data.ctrl[:] = rng.uniform(-1.0, 1.0, 7)
         mujoco.mj_step(model, data, round(2.0 / SIM_DT))
-        off.append(abs(data.qpos[3] - DIP_BY_PIP * data.qpos[2]))
+        off.append(abs(data.qpos[3] - anatomy.DIP_BY_PIP * data.qpos[2]))
     assert np.degrees(max(off)) < 16.0
     assert np.degrees(np.median(off)) < 11.0

@@ -6,13 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.finger.anatomy import (
-    DIP_BAND,
-    JOINT_RANGE,
-    LEAST_TENSION_N,
-    MOMENT_ARMS,
-    PHALANX_LENGTH_M,
-)
+from shapechanger.finger import anatomy
 from shapechanger.finger.postures import (
     angles_for,
     coupled,
@@ -24,7 +18,7 @@ from shapechanger.finger.postures import (
 from shapechanger.finger.task import fingertip
 from tests.finger.commands import can_hold, made
 
-_LOW, _HIGH = JOINT_RANGE.T
+_LOW, _HIGH = anatomy.JOINT_RANGE.T
 
 
 @pytest.mark.parametrize("draw", [draw_posture, draw_start])
@@ -44,7 +38,7 @@ def test_every_posture_of_the_range_can_be_held() -> None:
     shares = np.stack(np.meshgrid(*[[0.0, 0.5, 1.0]] * 4), axis=-1).reshape(-1, 4)
     for share in shares:
         free = low[:3] + share[:3] * (high - low)[:3]
-        off = DIP_BAND * (2.0 * share[3] - 1.0)
+        off = anatomy.DIP_BAND * (2.0 * share[3] - 1.0)
         assert can_hold(np.array(coupled(free[0], free[1], free[2], off)).clip(low, high))
 
 
@@ -60,7 +54,7 @@ def test_moving_torque_gives_the_acceleration() -> None:
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = angles, speed
         data.act[:] = -1.0
-        least = MOMENT_ARMS.T @ np.full(7, LEAST_TENSION_N)
+        least = anatomy.MOMENT_ARMS.T @ np.full(7, anatomy.LEAST_TENSION_N)
         asked = moving_torque(angles, speed, acceleration)
         data.qfrc_applied[:] = asked - friction - least
         mujoco.mj_forward(model, data)
@@ -85,7 +79,7 @@ def test_the_fingertip_of_any_posture_is_reached() -> None:
 @pytest.mark.parametrize(
     ("place", "least_mm"),
     [
-        ((sum(PHALANX_LENGTH_M) + 0.001, 0.0, 0.0), 1.0),
+        ((sum(anatomy.PHALANX_LENGTH_M) + 0.001, 0.0, 0.0), 1.0),
         ((0.5, 0.0, 0.0), 408.4),
         ((0.05, 0.08, 0.0), 5.0),
         ((-0.08, 0.0, 0.0), 5.0),

@@ -8,18 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from shapechanger.finger import visuals
 from shapechanger.finger.anatomy import JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.model import TARGET, FingerFigure, build_finger, finger_mjcf
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.tensions import DRIVES, drive_of
-from shapechanger.finger.visuals import (
-    TENDON_COLOURS,
-    THICKEST_M,
-    THINNEST_M,
-    route_names,
-    tendon_legend,
-)
 from tests.finger.commands import STRETCHED, at_rest, made
 
 
@@ -49,7 +43,7 @@ def test_each_tendon_ends_at_its_bone(tendon: str) -> None:
     """Routes start in the hand, pass the bones in order, and end at the tendon's insertion."""
     model = made(anatomy=True)
     order = ["hand", "proximal", "middle", "distal"]
-    for course in route_names(tendon):
+    for course in visuals.route_names(tendon):
         number = model.tendon(course).id
         first = model.tendon_adr[number]
         points = slice(first, first + model.tendon_num[number])
@@ -88,8 +82,8 @@ def test_show_sets_the_figure() -> None:
     body = figure.model.body(TARGET).id
     np.testing.assert_array_equal(figure.data.xpos[body], [0.05, 0.01, -0.04])
     widths = figure.model.tendon_width[[figure.model.tendon(f"{t}/course").id for t in TENDONS]]
-    assert widths[0] == pytest.approx(THINNEST_M)
-    assert widths[-1] == pytest.approx(THICKEST_M)
+    assert widths[0] == pytest.approx(visuals.THINNEST_M)
+    assert widths[-1] == pytest.approx(visuals.THICKEST_M)
     assert (np.diff(widths[:6]) > 0.0).all()
 
 
@@ -216,9 +210,9 @@ def test_a_picture_shows_the_whole_finger_and_no_target(finger: Any) -> None:
 def test_the_legend_shows_tensions() -> None:
     """Bars in the colours of the tendons grow with the tension; small frames have no bars."""
     frame = np.full((360, 480, 3), 230, np.uint8)
-    slack, taut = (tendon_legend(frame, np.full(7, pulled)) for pulled in (0.0, 1.0))
+    slack, taut = (visuals.tendon_legend(frame, np.full(7, pulled)) for pulled in (0.0, 1.0))
     assert slack.shape == frame.shape
-    for colour in TENDON_COLOURS.values():
+    for colour in visuals.TENDON_COLOURS.values():
         paint = np.round(255 * np.array(colour))
         drawn = [int((one == paint).all(axis=2).sum()) for one in (slack, taut)]
         assert drawn[1] > 20 * drawn[0]
@@ -226,4 +220,4 @@ def test_the_legend_shows_tensions() -> None:
     assert (taut[45:] == 230).all()  # The legend leaves room for the finger.
     assert (frame == 230).all()
     small = frame[:120, :160]
-    assert tendon_legend(small, np.ones(7)) is small
+    assert visuals.tendon_legend(small, np.ones(7)) is small

@@ -8,8 +8,9 @@ import numpy as np
 
 import shapechanger  # noqa: F401 - Registers the ids.
 from shapechanger.finger.identify import FingerLog
+from shapechanger.finger.identify.kinematics import ARMS, Kinematics
 from shapechanger.finger.identify.log import record_babble
-from shapechanger.finger.parameters import FingerParameters
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
 
 
 def recorded(seconds: float, seed: int = 0, **arguments: Any) -> tuple[FingerLog, FingerParameters]:
@@ -28,6 +29,18 @@ def made_up(rows: int = 300) -> FingerLog:
     angles = np.sin(np.outer(t, [2.0, 3.1, 4.3, 5.7]))
     nothing = np.zeros((rows, 7))
     return FingerLog(t, nothing, angles, nothing, nothing, "impedance", 0.02)
+
+
+def kinematics(
+    compliance: float = 0.0,
+    compliance_sd: float = 1e-6,
+    noise: float = 1e-6,
+    angles: np.ndarray | None = None,
+) -> Kinematics:
+    """Return kinematics with nominal arms and a standard error of 0.1 mm."""
+    angles = np.zeros((1, 4)) if angles is None else angles
+    arms, sd = NOMINAL.arms, 1e-4 * ARMS
+    return Kinematics(arms, sd, compliance, compliance_sd, np.full(4, noise), angles)
 
 
 def changed(log: FingerLog, **changes: Any) -> FingerLog:

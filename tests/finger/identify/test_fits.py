@@ -28,9 +28,7 @@ from shapechanger.finger.identify.motion import (
     with_motors,
 )
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
-from tests.finger.identify.logs import changed, made_up, recorded, swings, synthetic
-
-ARM_SD_M = 2e-4
+from tests.finger.identify.logs import changed, kinematics, made_up, recorded, swings, synthetic
 
 
 @functools.cache
@@ -45,17 +43,9 @@ def short() -> tuple[FingerLog, FingerParameters]:
     return recorded(2.6, parameters=parameters)
 
 
-def exact(arms: np.ndarray = NOMINAL.arms) -> Kinematics:
-    """Return kinematics without noise, with the given arms."""
-    log, _ = short()
-    return Kinematics(
-        arms=arms,
-        arms_sd=ARM_SD_M * ARMS,
-        compliance=0.0,
-        compliance_sd=1e-9,
-        joint_noise=np.full(4, 1e-6),
-        angles=log.angles,
-    )
+def exact() -> Kinematics:
+    """Return kinematics without noise."""
+    return kinematics(angles=short()[0].angles)
 
 
 def motors(**changes: float) -> Motors:
@@ -109,10 +99,10 @@ def test_known_motors_take_precedence() -> None:
 
 def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without its dependencies, `mujoco.sysid` is an empty module."""
-    log, kinematics = short()[0], exact()  # These import the env, so they precede the patch.
+    log, found = short()[0], exact()  # These import the env, so they precede the patch.
     monkeypatch.setattr(importlib, "import_module", lambda name: object())
     with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
-        fit_dynamics(log, kinematics, motors())
+        fit_dynamics(log, found, motors())
 
 
 def stepped() -> CommandSignal:
