@@ -20,9 +20,8 @@ STRETCHED = NOMINAL.replace(
 def can_hold(angles: np.ndarray) -> bool:
     """Return whether feasible tensions hold the nominal finger at these angles, rad, (4,)."""
     torque = moving_torque(angles, np.zeros(4), np.zeros(4))
-    return tensions_for_torque(
-        anatomy.MOMENT_ARMS, torque, anatomy.LEAST_TENSION_N, anatomy.MOST_TENSION_N
-    )[1]
+    limits = anatomy.LEAST_TENSION_N, anatomy.MOST_TENSION_N
+    return tensions_for_torque(anatomy.MOMENT_ARMS, torque, *limits)[1]
 
 
 def made(
@@ -35,11 +34,9 @@ def made(
 def at_rest(model: mujoco.MjModel, parameters: FingerParameters = NOMINAL) -> mujoco.MjData:
     """Return a state in the resting posture with taut tendons."""
     data = mujoco.MjData(model)
-    data.qpos[: len(anatomy.JOINTS)] = anatomy.JOINT_REST
+    data.qpos[:4] = anatomy.JOINT_REST
     if parameters.gives:
-        data.qpos[len(anatomy.JOINTS) :] = (
-            parameters.arms @ anatomy.JOINT_REST + parameters.backlash
-        )
+        data.qpos[4:] = parameters.arms @ anatomy.JOINT_REST + parameters.backlash
     data.ctrl[:] = data.act[:] = -1.0
     return data
 

@@ -163,7 +163,7 @@ class RigMixin(FingerEnv):
 
     @property
     def exclusive(self) -> bool:
-        """Return whether this env blocks other clients of the robot: not with its own twin."""
+        """Return whether this env blocks other clients of a robot; False with its own twin."""
         return self._own is None
 
     @property

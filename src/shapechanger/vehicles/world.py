@@ -41,7 +41,7 @@ _HEARD_M: Final = 10.0  # Longest ray, more than twice the range of an HC-SR04.
 _SOLID: Final = (np.arange(mujoco.mjNGROUP) == SOLID_GROUP).astype(np.uint8)
 _COARSE_DT: Final = 2.0 * SIM_DT
 _ROUNDING_S: Final = 1e-9
-# Number of cached courses: to lay out one takes 70 ms, to plan its path 60; a model has 5 MB.
+# Number of cached courses: the layout takes 70 ms, and the path 60 ms; a model takes 5 MB.
 _KEPT_COURSES: Final = 64
 # Views from outside are a little above, at a height on the vehicle, m. At MuJoCo's field of view of
 # 45 degrees a sphere of radius 1 fills the height at a distance of 2.6.
@@ -358,7 +358,7 @@ def _compiled(
     spec.option.timestep = step_s
     ground = spec.geom("world/ground")
     for geom in spec.geoms if coarse else ():
-        # Pair wheels with the ground: searching for all that they meet takes a third of a step.
+        # Pair wheels with the ground only: to search for all contacts takes a third of a step.
         if geom.contype & ground.conaffinity and geom.name.startswith("vehicle/"):
             geom.contype = geom.conaffinity = 0
             # MuJoCo's rule for combining the frictions of two geoms.

@@ -27,7 +27,7 @@ from shapechanger.vehicles.courses.geometry import (
 )
 from shapechanger.vehicles.envs import RangesEnv
 from shapechanger.vehicles.expert.driver import TRAITS, CourseExpert, plan_path_for
-from shapechanger.vehicles.expert.path import CoursePath, plan_path
+from shapechanger.vehicles.expert.path import plan_path
 
 
 def ring(seed: int, *, radius: float = 8.0, obstacles: int = 10) -> Course:
@@ -113,21 +113,13 @@ def test_progress_is_the_net_distance() -> None:
     assert metres == pytest.approx(-1.0, abs=0.2)
 
 
-_CASES = list(itertools.product(HOME, range(3)))
-
-
-def _planned(vehicle: str, seed: int) -> tuple[Course, CoursePath, float]:
-    """Return a course of the vehicle, its path, and the required clearance."""
-    traits = TRAITS[vehicle]
-    course = lay_out(HOME[vehicle], seed)
-    path = plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
-    return course, path, traits.half_width_m + traits.margin_m
-
-
-@pytest.mark.parametrize(("vehicle", "seed"), _CASES)
+@pytest.mark.parametrize("vehicle", HOME)
+@pytest.mark.parametrize("seed", range(3))
 def test_properties_of_a_path(vehicle: str, seed: int) -> None:
     """A path is closed, evenly spaced, goes around the lane once, and keeps its clearance."""
-    course, path, least = _planned(vehicle, seed)
+    course, traits = lay_out(HOME[vehicle], seed), TRAITS[vehicle]
+    path = plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
+    least = traits.half_width_m + traits.margin_m
     steps = np.roll(path.points, -1, axis=0) - path.points
     sizes = np.hypot(steps[:, 0], steps[:, 1])
     np.testing.assert_allclose(sizes, 0.1, rtol=0.05)

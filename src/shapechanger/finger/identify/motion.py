@@ -302,7 +302,7 @@ class _MotionFit:
         )
 
     def parameters(self) -> Any:
-        """Initial parameters and their bounds, as `mujoco.sysid` takes them."""
+        """Initial parameters and their bounds, for `mujoco.sysid`."""
         found, ends = self._sysid.ParameterDict(), np.full(len(FACTORS), _MAX_LOG_FACTOR)
         found.add(self._sysid.Parameter("factors", np.zeros(len(FACTORS)), -ends, ends))
         return found

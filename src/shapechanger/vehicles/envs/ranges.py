@@ -210,7 +210,7 @@ class RangesEnv(DriveEnv):
         command = tuple(leave_rest(values, world.inputs().stands).tolist())
         world.advance(self._period_s, shaper.outputs(command, self._bumped, self._ticks))
         collided = world.collisions > collisions
-        self._bumped = world.bumped  # Before it is put back: a robot's reflex outlasts the contact.
+        self._bumped = world.bumped  # Before `put_back`: the reflex lasts longer than the contact.
         self._progress_m = world.progress_m
         speed = (self._progress_m - progress) / self._period_s
         stands = abs(speed) < STANDING_MPS

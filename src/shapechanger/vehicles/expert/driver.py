@@ -122,8 +122,8 @@ _ABOUT_RATE: Final = 2.5
 _PATIENCE_S: Final = 0.7
 _SCRAPING_S: Final = 3.0
 _ASKED: Final = 0.25  # Throttle or steering above which a vehicle counts as driven.
-# A vehicle stands still below the first share of its top speed, and is slow below the second. It
-# does not stand still at rates of turn above `_TURNING`, rad/s.
+# Shares of the top speed below which a vehicle stands still, or is slow; and rate of turn, rad/s,
+# above which a vehicle does not stand still.
 _STILL: Final = 0.05
 _SLOW: Final = 0.25
 _TURNING: Final = 0.15

@@ -102,7 +102,7 @@ class _Lattice:
             short = self._least_m - path.clearance
             if short.max() <= 0:
                 return path
-            # Ask for more clearance wherever it is missing, and try again.
+            # Increase the clearance where it is too small, and try again.
             knots = np.arange(len(path.points)) * len(way) // len(path.points)
             need = np.zeros(len(way))
             np.maximum.at(need, knots, np.maximum(short, 0.0))
