@@ -7,15 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import UnknownName
+from shapechanger.finger import task
 from shapechanger.finger.anatomy import JOINT_RANGE, MOST_TENSION_N
 from shapechanger.finger.model import FINGERTIP
-from shapechanger.finger.task import (
-    FingerSenses,
-    FingertipReward,
-    features_of_senses,
-    fingertip,
-    fingertip_jacobian,
-)
 from tests.finger.commands import made
 
 # Angles within and beyond the joint limits.
@@ -32,8 +26,8 @@ def test_fingertip_matches_the_simulator() -> None:
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
         places.append(data.site_xpos[model.site(FINGERTIP).id].copy())
-    np.testing.assert_allclose(fingertip(angles), places, atol=1e-12)
-    assert fingertip(angles.reshape(4, 50, 4)).shape == (4, 50, 3)
+    np.testing.assert_allclose(task.fingertip(angles), places, atol=1e-12)
+    assert task.fingertip(angles.reshape(4, 50, 4)).shape == (4, 50, 3)
 
 
 @given(angles=_ANGLES)
@@ -41,41 +35,41 @@ def test_jacobian_matches_finite_differences(angles: tuple[float, ...]) -> None:
     """The Jacobian equals central differences at any angles, alone and in a batch."""
     step = 1e-6
     moved = np.array(angles) + step * np.concatenate([np.eye(4), -np.eye(4)])
-    there, back = fingertip(moved).reshape(2, 4, 3)
+    there, back = task.fingertip(moved).reshape(2, 4, 3)
     expected = ((there - back) / (2.0 * step)).T
-    np.testing.assert_allclose(fingertip_jacobian(angles), expected, atol=1e-9)
-    np.testing.assert_allclose(fingertip_jacobian([[angles]]), [[expected]], atol=1e-9)
+    np.testing.assert_allclose(task.fingertip_jacobian(angles), expected, atol=1e-9)
+    np.testing.assert_allclose(task.fingertip_jacobian([[angles]]), [[expected]], atol=1e-9)
 
 
 def test_nearness_grows_as_the_distance_shrinks() -> None:
     """Nearness grows fastest in the last millimetres, up to its weight per second."""
     distances = np.linspace(0.1, 0.0, 201)
-    near = FingertipReward().terms(distances, 0.0, 0.0, 0.02)["reward_nearness"]
+    near = task.FingertipReward().terms(distances, 0.0, 0.0, 0.02)["reward_nearness"]
     gains = np.diff(near)
     assert (gains > 0.0).all()
     assert gains.argmax() == len(gains) - 1
     assert near[0] > 0.0
-    assert FingertipReward().terms(0.0, 0.0, 0.0, 0.1)["reward_nearness"] == pytest.approx(5.0)
+    assert task.FingertipReward().terms(0.0, 0.0, 0.0, 0.1)["reward_nearness"] == pytest.approx(5.0)
 
 
 def test_effort_and_change_are_weighted() -> None:
     """Weights are costs per second, 0 for change by default; unknown weights are refused."""
-    plain = FingertipReward().terms(0.01, 0.5, 1.0, 0.02)
+    plain = task.FingertipReward().terms(0.01, 0.5, 1.0, 0.02)
     assert plain["reward_effort"] == pytest.approx(-0.01)
     assert plain["reward_change"] == 0.0
-    other = FingertipReward.from_weights({"change": 5.0, "effort": 0})
+    other = task.FingertipReward.from_weights({"change": 5.0, "effort": 0})
     assert other.terms(0.01, 0.5, 1.0, 0.02)["reward_change"] == pytest.approx(-0.1)
     assert other.terms(0.01, 0.5, 1.0, 0.02)["reward_effort"] == 0.0
-    assert other.nearness == FingertipReward().nearness
+    assert other.nearness == task.FingertipReward().nearness
     with pytest.raises(UnknownName, match=r"'nearnes'. Did you mean 'nearness'"):
-        FingertipReward.from_weights({"nearnes": 1.0})
+        task.FingertipReward.from_weights({"nearnes": 1.0})
 
 
 def test_numbers_match_their_features() -> None:
     """Each number has its name, unit, bounds and element."""
     parts = (4, 4, 7, 7, 7, 3)
-    senses = FingerSenses(*(10.0 * i + np.arange(n) for i, n in enumerate(parts)))
-    features = {f.name: f for f in features_of_senses()}
+    senses = task.FingerSenses(*(10.0 * i + np.arange(n) for i, n in enumerate(parts)))
+    features = {f.name: f for f in task.features_of_senses()}
     found = dict(zip(features, senses.numbers(), strict=True))
     expected = {
         "PIP_flexion/angle": (2.0, "rad", *JOINT_RANGE[2]),

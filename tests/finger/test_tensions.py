@@ -7,15 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from shapechanger.finger.anatomy import (
-    AN_1983_ARMS,
-    JOINT_RANGE,
-    JOINT_REST,
-    LEAST_TENSION_N,
-    MOMENT_ARMS,
-    MOST_TENSION_N,
-    PHALANX_LENGTH_M,
-)
+from shapechanger.finger import anatomy
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.tensions import (
     DRIVES,
@@ -26,30 +18,32 @@ from shapechanger.finger.tensions import (
 )
 from tests.finger.commands import made
 
+_ARMS = anatomy.MOMENT_ARMS
+_LEAST_N, _MOST_N = anatomy.LEAST_TENSION_N, anatomy.MOST_TENSION_N
 _STILL = np.zeros(7)
-_REST = -MOMENT_ARMS @ JOINT_REST
+_REST = -_ARMS @ anatomy.JOINT_REST
 _MICRO = 1e-6
 
 
 def test_arms_that_do_not_span_are_detected() -> None:
     """Arms span all torques if they have full rank and a co-contraction without a torque."""
-    tensions = co_contraction(MOMENT_ARMS)
+    tensions = co_contraction(_ARMS)
     assert tensions is not None
-    assert spans_all_torques(MOMENT_ARMS)
+    assert spans_all_torques(_ARMS)
     assert tensions.min() == pytest.approx(1.0)
-    np.testing.assert_allclose(MOMENT_ARMS.T @ tensions, 0.0, atol=1e-12)
-    assert co_contraction(np.abs(MOMENT_ARMS)) is None
-    numb = MOMENT_ARMS * (1.0, 1.0, 1.0, 0.0)
+    np.testing.assert_allclose(_ARMS.T @ tensions, 0.0, atol=1e-12)
+    assert co_contraction(np.abs(_ARMS)) is None
+    numb = _ARMS * (1.0, 1.0, 1.0, 0.0)
     assert co_contraction(numb) is not None
     # An et al.'s arms extend the middle and last joints too strongly to be balanced.
-    for arms in (np.abs(MOMENT_ARMS), numb, np.zeros((7, 4)), AN_1983_ARMS):
+    for arms in (np.abs(_ARMS), numb, np.zeros((7, 4)), anatomy.AN_1983_ARMS):
         assert not spans_all_torques(arms)
 
 
 def _problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Draw arms, a torque and bounds; half of the torques are feasible."""
     rng = np.random.default_rng(seed)
-    arms = MOMENT_ARMS * (1.0 + rng.uniform(-0.3, 0.3, MOMENT_ARMS.shape))
+    arms = _ARMS * (1.0 + rng.uniform(-0.3, 0.3, _ARMS.shape))
     low = rng.uniform(0.0, 2.0, 7)
     high = low + rng.uniform(0.5, 20.0, 7)
     torque = arms.T @ rng.uniform(low, high)
@@ -92,8 +86,8 @@ def test_command_inverts_tension(mode: str) -> None:
     assert (drive.tension(command + 0.1, length, speed) > tension).all()
     stiffer = drive.tension(_STILL, _REST + 0.01, _STILL) / drive.tension(_STILL, _REST, _STILL)
     if mode != "length":
-        np.testing.assert_allclose(drive.tension(-np.ones(7), _REST, _STILL), LEAST_TENSION_N)
-        np.testing.assert_allclose(drive.tension(np.ones(7), _REST, _STILL), MOST_TENSION_N)
+        np.testing.assert_allclose(drive.tension(-np.ones(7), _REST, _STILL), _LEAST_N)
+        np.testing.assert_allclose(drive.tension(np.ones(7), _REST, _STILL), _MOST_N)
         np.testing.assert_allclose(stiffer, 1.25 if mode == "impedance" else 1.0)
 
 
@@ -103,12 +97,12 @@ def test_the_model_pulls_as_the_drive(mode: str) -> None:
     model, drive = made(mode=mode), drive_of(mode, NOMINAL)
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     for _ in range(20):
-        data.qpos[:] = JOINT_REST + rng.uniform(-0.2, 0.2, 4)
+        data.qpos[:] = anatomy.JOINT_REST + rng.uniform(-0.2, 0.2, 4)
         data.qvel[:] = rng.uniform(-3.0, 3.0, 4)
         data.act[:] = rng.uniform(-1.0, 1.0, 7)
         mujoco.mj_forward(model, data)
-        asked = drive.tension(data.act, -MOMENT_ARMS @ data.qpos, -MOMENT_ARMS @ data.qvel)
-        expected = np.clip(asked, LEAST_TENSION_N, MOST_TENSION_N)
+        asked = drive.tension(data.act, -_ARMS @ data.qpos, -_ARMS @ data.qvel)
+        expected = np.clip(asked, _LEAST_N, _MOST_N)
         np.testing.assert_allclose(-data.actuator_force, expected, atol=1e-9)
 
 
@@ -116,10 +110,10 @@ def test_length_commands_span_all_postures() -> None:
     """In any posture, -1 gives at most the least tension, and 1 at least the largest."""
     drive = drive_of("length", NOMINAL)
     rng = np.random.default_rng(0)
-    for angles in rng.uniform(JOINT_RANGE[:, 0], JOINT_RANGE[:, 1], (50, 4)):
-        length = -MOMENT_ARMS @ angles
-        assert (drive.tension(-np.ones(7), length, _STILL) <= LEAST_TENSION_N + 1e-9).all()
-        assert (drive.tension(np.ones(7), length, _STILL) >= MOST_TENSION_N).all()
+    for angles in rng.uniform(anatomy.JOINT_RANGE[:, 0], anatomy.JOINT_RANGE[:, 1], (50, 4)):
+        length = -_ARMS @ angles
+        assert (drive.tension(-np.ones(7), length, _STILL) <= _LEAST_N + 1e-9).all()
+        assert (drive.tension(np.ones(7), length, _STILL) >= _MOST_N).all()
 
 
 # Effect of 1 N of each tendon at the fingertip of a cadaver's index finger: force sideways, along
@@ -138,10 +132,10 @@ def test_moment_arms_follow_from_measured_forces() -> None:
     z = (torque[_FDS] - y * across[_FDS]) / -along[_FDS]
     assert math.hypot(y, z) == pytest.approx(0.016, abs=1e-4)
     assert math.degrees(math.atan2(abs(y), abs(z))) == pytest.approx(10.0, abs=0.1)
-    proximal, middle, _ = PHALANX_LENGTH_M
+    proximal, middle, _ = anatomy.PHALANX_LENGTH_M
     level = math.cos(math.radians(45.0)) * proximal
     end = torque - y * across + z * along
     mid = end - middle * along
     knuckle = mid + level * (across - along)
     arms = np.stack([knuckle, aside * (level - y), mid, end], axis=1)
-    np.testing.assert_allclose(1e3 * MOMENT_ARMS, 1e3 * arms, atol=0.06)
+    np.testing.assert_allclose(1e3 * _ARMS, 1e3 * arms, atol=0.06)
