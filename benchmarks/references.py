@@ -20,7 +20,7 @@ import numpy as np
 import shapechanger
 from benchmarks.row import Row, asked
 from shapechanger.contract.env_ref import EnvRef, measures_of
-from shapechanger.envs.naming import default_learner
+from shapechanger.envs.catalogue import default_learner
 from shapechanger.files import read_json, write_atomic, write_json
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import use_one_thread

@@ -71,7 +71,7 @@ def environment_pages() -> Pages:
     )
     bodies: list[tuple[str, ...]] = []
     for env_id, entry in ODRL_ENVS.items():
-        edits = _loaded(entry.entry_point).family.body(entry.name)
+        edits = _loaded(str(gym.registry[env_id].entry_point)).family.body(entry.name)
         changes = ", ".join(f"`{edit}`" for edit in edits) or "none: a source"
         bodies.append((f"`{env_id}`", changes))
     pages["environments/ODRL.md"] = _page(

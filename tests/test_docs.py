@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from shapechanger.contract.env_ref import layouts_of
-from shapechanger.envs.naming import env_ref
+from shapechanger.envs.catalogue import env_ref
 from shapechanger.transfer import study
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.plan import Plan

@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks.run import SUITES
 from shapechanger.cli.main import Group, find_command, options_of, parse
-from shapechanger.envs.naming import env_ref
+from shapechanger.envs.catalogue import env_ref
 from shapechanger.errors import ShapechangerError
 
 ROOT: Final = Path(__file__).parents[1]

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.envs.naming import driven, env_ref
+from shapechanger.envs.catalogue import driven, env_ref
 from shapechanger.envs.study_films import film_study
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import learner_settings, resolve_learner

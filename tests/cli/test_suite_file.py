@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.envs.naming import driven, env_ref, short_name
+from shapechanger.envs.catalogue import driven, env_ref, short_name
 from shapechanger.envs.suite_file import load_suite, shipped_suites, suite_tasks
 from shapechanger.transfer.plan import TransferTask
 from tests.cli.running import Cli

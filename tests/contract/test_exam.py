@@ -60,8 +60,8 @@ _MAKERS: dict[str, MakeEnv] = {env_id: partial(gym.make, env_id) for env_id in C
 # Without images, no renderer is needed. A truck's default world is so open that its sensors read
 # the same at each start.
 _BLIND: dict[str, MakeEnv] = {
-    env_id: partial(gym.make, env_id, image=False, world="corridor" if vehicle == "truck" else None)
-    for env_id, (vehicle, _) in VEHICLE_ENVS.items()
+    env_id: partial(gym.make, env_id, image=False, world="corridor" if "Truck" in env_id else None)
+    for env_id in VEHICLE_ENVS
 }
 _RANGES: dict[str, MakeEnv] = {
     env_id: partial(gym.make, env_id, courses=(0, 1)) for env_id in RANGES_ENVS

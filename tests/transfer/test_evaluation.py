@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.contract.env_ref import FORWARD_SPEED, EnvRef, measures_of
-from shapechanger.envs.catalogue import CATALOGUE
-from shapechanger.envs.naming import default_learner
+from shapechanger.envs.catalogue import CATALOGUE, default_learner
 from shapechanger.errors import UnknownName
 from shapechanger.policy import load_policy
 from shapechanger.transfer.identities import ENV, identify, known

@@ -14,8 +14,7 @@ import gymnasium as gym
 import tyro
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.catalogue import CATALOGUE
-from shapechanger.envs.naming import allow_own_modules, driven, env_ref
+from shapechanger.envs.catalogue import CATALOGUE, allow_own_modules, driven, env_ref
 from shapechanger.errors import MorphologyError, StudyError, no_policy_file
 from shapechanger.transfer.references import reference_policy
 

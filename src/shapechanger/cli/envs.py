@@ -13,7 +13,7 @@ from shapechanger.cli.console import plain_console, print_table, say
 from shapechanger.cli.env_arguments import OneEnv, TwoEnvs, asked, opened
 from shapechanger.contract.env_ref import layouts_of
 from shapechanger.contract.testing import examine
-from shapechanger.envs.catalogue import ODRL_ENVS, OWN_ROBOT, summaries
+from shapechanger.envs.catalogue import ODRL_ENVS, summaries
 from shapechanger.layout import Layout
 from shapechanger.reports.films import write_picture
 
@@ -34,7 +34,6 @@ class EnvsList:
             return
         for env_id, summary in summaries().items():
             table.add_row(env_id, summary)
-        table.add_row(OWN_ROBOT, "your MJCF or URDF file; give FILE or FILE@TASK as ENV")
         robots = len({entry.family for entry in ODRL_ENVS.values()})
         targets = len(ODRL_ENVS) - robots
         table.add_row(

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from shapechanger.cli.console import print_table, say
 from shapechanger.cli.env_arguments import EnvId, opened, options_of
-from shapechanger.envs.naming import env_ref
+from shapechanger.envs.catalogue import env_ref
 from shapechanger.errors import FingerError, OutputError, StudyError, check_seed
 from shapechanger.files import read_file, require_file, write_atomic
 from shapechanger.finger.anatomy import JOINTS, TENDONS

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapechanger.cli.console import say
 from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened, policy_file
 from shapechanger.contract.env_ref import EnvRef, layouts_of
-from shapechanger.envs.naming import allow_own_modules, env_ref
+from shapechanger.envs.catalogue import allow_own_modules, env_ref
 from shapechanger.envs.opengl import has_screen
 from shapechanger.errors import StudyError, check_seed
 from shapechanger.identity import identify_env

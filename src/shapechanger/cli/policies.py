@@ -25,8 +25,13 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.cli.play import Watching, acting_in, load_any_policy
 from shapechanger.contract.env_ref import EnvRef, hold_out, layouts_of, measures_of
-from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
-from shapechanger.envs.naming import allow_own_modules, driven, env_ref
+from shapechanger.envs.catalogue import (
+    VEHICLE_ENVS,
+    WAYPOINT_ENVS,
+    allow_own_modules,
+    driven,
+    env_ref,
+)
 from shapechanger.errors import HubError, PolicyError, ShapechangerError, StudyError
 from shapechanger.files import require_file, write_atomic
 from shapechanger.identity import identify_env, texts_in
@@ -227,7 +232,7 @@ def _learned_with(card: PolicyCard, net: CloneNetwork) -> tuple[str, float | Non
     if card.env is None:
         return net.body, net.control_hz
     # Waypoints have the same meaning in all bodies.
-    body, _ = VEHICLE_ENVS.get(card.env.id, ("", ""))
+    body = VEHICLE_ENVS[card.env.id].kwargs["vehicle"] if card.env.id in VEHICLE_ENVS else ""
     return body, 1.0 / PERIOD_S if body or card.env.id in WAYPOINT_ENVS else None
 
 

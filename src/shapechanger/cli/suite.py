@@ -16,7 +16,7 @@ from rich.table import Table
 
 from shapechanger.cli.console import Interrupted, command_line, plain_console, print_table, say
 from shapechanger.cli.transfer import StudyRuns, run_showing_progress
-from shapechanger.envs.naming import allow_own_modules, default_learner
+from shapechanger.envs.catalogue import allow_own_modules, default_learner
 from shapechanger.envs.study_films import film_study
 from shapechanger.envs.suite_file import (
     SuiteFile,

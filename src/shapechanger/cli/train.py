@@ -13,7 +13,7 @@ import msgspec
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
 from shapechanger.cli.env_arguments import Body, EnvId, Learner, Settings, opened, settings_of
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_traits
-from shapechanger.envs.naming import allow_own_modules, default_learner, driven, env_ref
+from shapechanger.envs.catalogue import allow_own_modules, default_learner, driven, env_ref
 from shapechanger.errors import MissingExtra, StudyError, check_seed
 from shapechanger.files import make_folder, require_file
 from shapechanger.policy import load_policy

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, print_table, say
 from shapechanger.cli.env_arguments import Learner, Settings, TwoEnvs, policy_file, settings_of
-from shapechanger.envs.naming import allow_own_modules, default_learner, short_name
+from shapechanger.envs.catalogue import allow_own_modules, default_learner, short_name
 from shapechanger.errors import MapError, OutputError, StudyError, check_seed
 from shapechanger.files import read_text
 from shapechanger.registry import METHODS

@@ -1,52 +1,28 @@
-"""Ids of all envs, registered without importing a simulator."""
+"""All envs by name: their ids, registered without importing a simulator, and names that users give.
+
+Users name an env by its id, by a short name such as `BigAnt`, or by the file of a robot.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import gymnasium as gym
 import msgspec
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.odrl import odrl_bodies
-from shapechanger.errors import UnknownName
+from shapechanger.envs.opengl import require_known_gl
+from shapechanger.errors import MorphologyError, StudyError, UnknownName
 
 NAMESPACE: Final = "shapechanger"
-
-# Envs of robots on the network: two for a finger on a rig, with the layouts of `Finger-v1` and
-# `FingerTrack-v1`; one for a robot whose body is unknown until it answers; and one for a vehicle
-# with the camera and the action that all vehicles share.
-REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
-REMOTE_FINGER_TRACK: Final = "shapechanger/RemoteFingerTrack-v1"
-REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
-REMOTE_WAYPOINT: Final = "shapechanger/RemoteWaypoint-v1"
-OWN_ROBOT: Final = "shapechanger/OwnRobot-v1"
-"""Id of the env for a user's robot, from a file, with an optional task of the user."""
-
 MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
 """Suffixes of files of users' robots."""
-
-VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = {
-    "shapechanger/Car-v1": ("car", "front wheels that steer, in a corridor"),
-    "shapechanger/Tank-v1": ("tank", "two tracks, in a corridor"),
-    "shapechanger/Truck-v1": ("truck", "front wheels that steer and a trailer, in a yard"),
-    "shapechanger/Boat-v1": ("boat", "propeller and rudder, in a harbour"),
-}
-"""Vehicle and summary, keyed by id; all have the same task, and their bodies form no family."""
-
-
-def _variants(suffix: str, summary: str) -> Mapping[str, tuple[str, str]]:
-    return {
-        env_id.replace("-v1", f"{suffix}-v1"): (vehicle, summary)
-        for env_id, (vehicle, _) in VEHICLE_ENVS.items()
-    }
-
-
-RANGES_ENVS: Final = _variants("Ranges", "the same task with distances instead of images; fast")
-"""Vehicle and summary, keyed by id, for the same task with distances instead of images."""
-
-WAYPOINT_ENVS: Final = _variants("Waypoint", "camera and action are the same for all vehicles")
-"""Vehicle and summary, keyed by id, for the same task with waypoints as actions."""
+_IN_MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^:]+")  # Such as `module:id`.
 
 
 class CatalogueEntry(msgspec.Struct, frozen=True):
@@ -54,23 +30,25 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
 
     Attributes:
         name: Its name; the id is `shapechanger/NAME-v1`.
-        family: Name of its body's family; empty for an env whose body belongs to none.
-        summary: One-line description.
-        entry_point: Module and class.
+        summary: One-line description; empty for the envs of robots on the network.
+        entry_point: Module and class, below `shapechanger`.
         learner: Name of the learner settings tuned on the family or the env.
+        family: Name of its body's family; empty for an env whose body belongs to none.
         reward_threshold: Return that counts as solved.
-        episode_steps: Steps after which an episode is truncated.
+        episode_steps: Steps after which an episode is truncated; None for never.
         device: Module that registers its batched functions for a device; empty if it has none.
+        kwargs: Arguments of the class.
     """
 
     name: str
-    family: str
     summary: str
     entry_point: str
-    learner: str
+    learner: str = "ppo-run"
+    family: str = ""
     reward_threshold: float | None = None
-    episode_steps: int = 1000
+    episode_steps: int | None = 1000
     device: str = ""
+    kwargs: Mapping[str, Any] = {}
 
     @property
     def id(self) -> str:
@@ -78,19 +56,9 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
         return f"{NAMESPACE}/{self.name}-v1"
 
 
-def _finger(name: str, entry_point: str, task: str, steps: int) -> CatalogueEntry:
-    return CatalogueEntry(
-        *(name, "", f"finger of seven tendons: {task}", f"shapechanger.finger.{entry_point}"),
-        learner="ppo-finger",
-        episode_steps=steps,
-        device="shapechanger.finger.gpu",
-    )
+def _by_id(*entries: CatalogueEntry) -> dict[str, CatalogueEntry]:
+    return {entry.id: entry for entry in entries}
 
-
-_REACH: Final = _finger("Finger", "reach:FingerReachEnv", "reach a point", 100)
-_TRACK: Final = _finger("FingerTrack", "track:FingerTrackEnv", "follow a path", 250)
-FINGER_ENVS: Final = {entry.id: entry for entry in (_REACH, _TRACK)}
-"""Envs of the finger, keyed by id."""
 
 # For each family the module and class of its env, the learner settings tuned on it, and the reward
 # threshold of Gymnasium's v5 id.
@@ -104,100 +72,143 @@ _FAMILIES: Final = {
     "Humanoid": ("runners:HumanoidEnv", "ppo-humanoid", None),
     "InvertedDoublePendulum": ("pendulum:InvertedDoublePendulumEnv", "ppo-planar", 9100.0),
 }
-# Name, family and summary of each body.
-_BODIES: Final = (
-    ("InvertedPendulum", "InvertedPendulum", "a pole of 0.6 m on a cart"),
-    ("SmallInvertedPendulum", "InvertedPendulum", "a pole half as long"),
-    ("BigInvertedPendulum", "InvertedPendulum", "a pole twice as long"),
-    ("Ant", "Ant", "four legs of two joints"),
-    ("AmputatedAnt", "Ant", "one back shank cut to a quarter"),
-    ("BigAnt", "Ant", "all shanks twice as long"),
-    ("ExtendedAnt", "Ant", "a third segment with a motor on each leg"),
-    ("HalfCheetah", "HalfCheetah", "half a cheetah that runs in a plane"),
-    ("Hopper", "Hopper", "one leg that hops in a plane"),
-    ("Walker2d", "Walker2d", "two legs that walk in a plane"),
-    ("Swimmer", "Swimmer", "three links that swim"),
-    ("Humanoid", "Humanoid", "two legs, two arms and a waist"),
-    ("InvertedDoublePendulum", "InvertedDoublePendulum", "two poles on a cart"),
-)
-
-
-def _entry(name: str, family: str, summary: str) -> CatalogueEntry:
-    entry_point, learner, threshold = _FAMILIES[family]
-    if name == "ExtendedAnt":  # Its spaces are larger, so its class has a page of its own.
-        entry_point = "ant:ExtendedAntEnv"
-    place = f"shapechanger.envs.{entry_point}"
-    return CatalogueEntry(name, family, summary, place, learner, threshold)
-
-
-CATALOGUE: Final = {entry.id: entry for entry in (_entry(*row) for row in _BODIES)}
-
-_ROBOTS: Final = {family.lower(): family for family in _FAMILIES}
-ODRL_ENVS: Final = {
-    entry.id: entry
-    for name in odrl_bodies()  # Such as `odrl-ant-friction-0.1`.
-    for task in [name.removeprefix("odrl-")]
-    for entry in [_entry(name, _ROBOTS[task.partition("-")[0]], f"body of ODRL: {task}")]
-}
-"""Envs of ODRL, keyed by id: 4 sources and 80 targets; see `shapechanger.envs.odrl`."""
-
-# Envs whose bodies form no family, except the vehicle on the network.
-_TASK_IDS: Final = (
-    *(*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS),
-    *(REMOTE_FINGER, REMOTE_FINGER_TRACK, OWN_ROBOT),
-)
 # Families with their own fast step, which Gymnasium's wrappers would slow down.
 _TUNED: Final = ("Ant", "InvertedPendulum")
 
 
+def _body(name: str, family: str, summary: str) -> CatalogueEntry:
+    entry_point, learner, threshold = _FAMILIES[family]
+    if name == "ExtendedAnt":  # Its spaces are larger, so its class has a page of its own.
+        entry_point = "ant:ExtendedAntEnv"
+    place = f"envs.{entry_point}"
+    return CatalogueEntry(name, summary, place, learner, family, threshold, kwargs={"body": name})
+
+
+CATALOGUE: Final = _by_id(
+    _body("InvertedPendulum", "InvertedPendulum", "a pole of 0.6 m on a cart"),
+    _body("SmallInvertedPendulum", "InvertedPendulum", "a pole half as long"),
+    _body("BigInvertedPendulum", "InvertedPendulum", "a pole twice as long"),
+    _body("Ant", "Ant", "four legs of two joints"),
+    _body("AmputatedAnt", "Ant", "one back shank cut to a quarter"),
+    _body("BigAnt", "Ant", "all shanks twice as long"),
+    _body("ExtendedAnt", "Ant", "a third segment with a motor on each leg"),
+    _body("HalfCheetah", "HalfCheetah", "half a cheetah that runs in a plane"),
+    _body("Hopper", "Hopper", "one leg that hops in a plane"),
+    _body("Walker2d", "Walker2d", "two legs that walk in a plane"),
+    _body("Swimmer", "Swimmer", "three links that swim"),
+    _body("Humanoid", "Humanoid", "two legs, two arms and a waist"),
+    _body("InvertedDoublePendulum", "InvertedDoublePendulum", "two poles on a cart"),
+)
+"""Envs whose bodies belong to a family, keyed by id."""
+
+_ROBOTS: Final = {family.lower(): family for family in _FAMILIES}
+ODRL_ENVS: Final = _by_id(
+    *(
+        _body(name, _ROBOTS[name.split("-")[1]], f"body of ODRL: {name.removeprefix('odrl-')}")
+        for name in odrl_bodies()  # Such as `odrl-ant-friction-0.1`.
+    )
+)
+"""Envs of ODRL, keyed by id: 4 sources and 80 targets; see `shapechanger.envs.odrl`."""
+
+
+_VEHICLES: Final = (
+    ("Car", "front wheels that steer, in a corridor"),
+    ("Tank", "two tracks, in a corridor"),
+    ("Truck", "front wheels that steer and a trailer, in a yard"),
+    ("Boat", "propeller and rudder, in a harbour"),
+)
+
+
+def _drive(
+    suffix: str, kind: str, steps: int, learner: str, summary: str = ""
+) -> dict[str, CatalogueEntry]:
+    """Return an env of each vehicle with the same task, keyed by id."""
+    entries: list[CatalogueEntry] = []
+    for name, world in _VEHICLES:
+        body = name.lower()
+        about = f"{name}{suffix}", f"{body}: {summary or world}", f"vehicles.envs.{kind}", learner
+        entries.append(CatalogueEntry(*about, episode_steps=steps, kwargs={"vehicle": body}))
+    return _by_id(*entries)
+
+
+VEHICLE_ENVS: Final = _drive("", "vehicle:VehicleEnv", 1000, "cloning")
+"""Envs of vehicles with a camera, keyed by id; their bodies form no family."""
+RANGES_ENVS: Final = _drive(
+    *("Ranges", "ranges:RangesEnv", 400, "ppo-drive"),  # Short, so that learners see more courses.
+    "the same task with distances instead of images; fast",
+)
+"""Envs of vehicles with distances instead of images, keyed by id."""
+WAYPOINT_ENVS: Final = _drive(
+    *("Waypoint", "vehicle:WaypointEnv", 1000, "waypoint"),
+    "camera and action are the same for all vehicles",
+)
+"""Envs of vehicles with waypoints as actions, keyed by id."""
+
+
+def _finger(name: str, entry_point: str, task: str, steps: int) -> CatalogueEntry:
+    return CatalogueEntry(
+        *(name, f"finger of seven tendons: {task}", f"finger.{entry_point}", "ppo-finger"),
+        episode_steps=steps,
+        device="shapechanger.finger.gpu",
+    )
+
+
+FINGER_ENVS: Final = _by_id(
+    _finger("Finger", "reach:FingerReachEnv", "reach a point", 100),
+    _finger("FingerTrack", "track:FingerTrackEnv", "follow a path", 250),
+)
+"""Envs of the finger, keyed by id."""
+
+_OWN: Final = CatalogueEntry(
+    *("OwnRobot", "your MJCF or URDF file; give FILE or FILE@TASK as ENV", "envs.own:OwnRobotEnv")
+)
+OWN_ROBOT: Final = _OWN.id
+"""Id of the env for a user's robot, from a file, with an optional task of the user."""
+
+# Envs of robots on the network: two for a finger on a rig, with the layouts of `Finger-v1` and
+# `FingerTrack-v1`; one for a robot whose body is unknown until it answers; and one for a vehicle
+# with the camera and the action that all vehicles share.
+_REMOTE: Final = _by_id(
+    *(
+        CatalogueEntry(f"Remote{name}", "", entry_point, learner, episode_steps=steps)
+        for name, entry_point, learner, steps in (
+            ("Finger", "finger.remote:RemoteFingerEnv", "ppo-rig", 100),
+            ("FingerTrack", "finger.remote:RemoteFingerTrackEnv", "ppo-rig", 250),
+            ("Vehicle", "robot.client.env:RemoteVehicleEnv", "ppo-run", None),
+            ("Waypoint", "vehicles.remote.waypoints:RemoteWaypointEnv", "ppo-run", None),
+        )
+    )
+)
+_DRIVES: Final = {**VEHICLE_ENVS, **RANGES_ENVS, **WAYPOINT_ENVS}
+# All envs but ODRL's.
+_NAMED: Final = {**CATALOGUE, OWN_ROBOT: _OWN, **_DRIVES, **FINGER_ENVS, **_REMOTE}
+# All envs, in the order of their registration.
+_ALL: Final = {**CATALOGUE, **ODRL_ENVS, **_NAMED}
+
+
 def summaries() -> dict[str, str]:
-    """Return a line on each env, keyed by id."""
-    vehicles = {**VEHICLE_ENVS, **RANGES_ENVS, **WAYPOINT_ENVS}
-    return {
-        **{entry.id: entry.summary for entry in CATALOGUE.values()},
-        **{env_id: f"{vehicle}: {summary}" for env_id, (vehicle, summary) in vehicles.items()},
-        **{env_id: task.summary for env_id, task in FINGER_ENVS.items()},
-    }
+    """Return a line on each env except ODRL's and those on the network, keyed by id."""
+    return {env_id: entry.summary for env_id, entry in _NAMED.items() if entry.summary}
 
 
 def register_all() -> None:
-    """Register every env of the catalogue with Gymnasium, once."""
-    for entry in (*CATALOGUE.values(), *ODRL_ENVS.values()):
-        _register(
-            entry.id,
-            entry.entry_point,
+    """Register every env with Gymnasium unless its id is registered already."""
+    for env_id, entry in _ALL.items():
+        if env_id in gym.registry:
+            continue
+        vectors = f"shapechanger.envs.make_vec:{entry.name}"
+        gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
+            env_id,
+            f"shapechanger.{entry.entry_point}",
             reward_threshold=entry.reward_threshold,
-            vector_entry_point=f"shapechanger.envs.make_vec:{entry.name}",
+            nondeterministic=env_id in _REMOTE,
+            max_episode_steps=entry.episode_steps,
             # These envs check that `reset` was called, and the tests check the envs.
             order_enforce=entry.family not in _TUNED,
             disable_env_checker=entry.family in _TUNED,
-            kwargs={"body": entry.name},
+            vector_entry_point=vectors if entry.family or entry is _OWN else None,
+            kwargs=dict(entry.kwargs),
         )
-    vectors = "shapechanger.envs.make_vec:OwnRobot"
-    _register(OWN_ROBOT, "shapechanger.envs.own:OwnRobotEnv", vector_entry_point=vectors)
-    for envs, kind, steps in (
-        (VEHICLE_ENVS, "vehicle:VehicleEnv", 1000),
-        (RANGES_ENVS, "ranges:RangesEnv", 400),  # Short, so that learners see more courses.
-        (WAYPOINT_ENVS, "vehicle:WaypointEnv", 1000),
-    ):
-        for env_id, (vehicle, _) in envs.items():
-            entry_point = f"shapechanger.vehicles.envs.{kind}"
-            _register(env_id, entry_point, steps, kwargs={"vehicle": vehicle})
-    for env_id, entry in FINGER_ENVS.items():
-        _register(env_id, entry.entry_point, entry.episode_steps)
-    for env_id, entry_point, steps in (
-        (REMOTE_FINGER, "finger.remote:RemoteFingerEnv", _REACH.episode_steps),
-        (REMOTE_FINGER_TRACK, "finger.remote:RemoteFingerTrackEnv", _TRACK.episode_steps),
-        (REMOTE_VEHICLE, "robot.client.env:RemoteVehicleEnv", None),
-        (REMOTE_WAYPOINT, "vehicles.remote.waypoints:RemoteWaypointEnv", None),
-    ):
-        _register(env_id, f"shapechanger.{entry_point}", steps, nondeterministic=True)
-
-
-def _register(env_id: str, entry_point: str, steps: int | None = 1000, **more: Any) -> None:
-    """Register an env unless it is registered already."""
-    if env_id not in gym.registry:
-        gym.register(env_id, entry_point, max_episode_steps=steps, **more)  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
 
 
 def find(env_id: str) -> CatalogueEntry:
@@ -206,24 +217,67 @@ def find(env_id: str) -> CatalogueEntry:
     Raises:
         UnknownName: If no such env exists.
     """
-    name = _name(env_id)
-    full = f"{NAMESPACE}/{name}-v1"
-    entry = CATALOGUE.get(full) or ODRL_ENVS.get(full)
+    name = env_id.removeprefix(f"{NAMESPACE}:").removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
+    if name.startswith("odrl/"):  # Ids of Gymnasium have one slash only.
+        name = name.replace("/", "-", 1)
+    entry = _ALL.get(f"{NAMESPACE}/{name}-v1")
     if entry is None:
-        if name.startswith("odrl"):
-            raise UnknownName("environment", name, [each.name for each in ODRL_ENVS.values()])
-        known = [entry.name for entry in CATALOGUE.values()]
-        raise UnknownName("environment", name, [*known, *map(_name, _TASK_IDS)])
+        known = ODRL_ENVS if name.startswith("odrl") else _NAMED
+        raise UnknownName("environment", name, [each.name for each in known.values()])
     return entry
 
 
-def find_task(env_id: str) -> str | None:
-    """Return the id of an env without a family, such as `Car` or `Finger`; None for others."""
-    full = f"{NAMESPACE}/{_name(env_id)}-v1"
-    return full if full in _TASK_IDS else None
+def env_ref(env_id: str, body: str = "") -> EnvRef:
+    """Return a reference to an env that a user names, optionally with another body."""
+    require_known_gl()
+    file, at, own_task = env_id.partition("@")
+    if file.endswith(MODEL_FILES):
+        allow_own_modules(own_task)
+        more = {"task": own_task} if at else {}
+        return EnvRef(OWN_ROBOT, {"path": file, **more, **({"body": body} if body else {})})
+    try:
+        full = find(env_id).id
+    except UnknownName:
+        # Accept third-party envs, as `module:id` or if registered; `make` checks them again.
+        if not _IN_MODULE.fullmatch(env_id) and env_id not in gym.registry:
+            raise
+        allow_own_modules(env_id)
+        full = env_id
+    if body and full not in {*CATALOGUE, *ODRL_ENVS, OWN_ROBOT}:
+        raise MorphologyError(f"{full} takes no body; these do: {', '.join(CATALOGUE)}.")
+    return EnvRef(full, {"body": body} if body else {})
 
 
-def _name(env_id: str) -> str:
-    name = env_id.removeprefix(f"{NAMESPACE}:").removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
-    # Ids of Gymnasium have one slash only.
-    return f"odrl-{name.removeprefix('odrl/')}" if name.startswith("odrl/") else name
+def short_name(env_id: str) -> str:
+    """Return the name of an env as a part of a folder's name."""
+    file, _, own_task = env_id.partition("@")
+    if file.endswith(MODEL_FILES):
+        return "-".join(filter(None, (Path(file).stem, own_task.rpartition(":")[2])))
+    return env_id.replace("odrl/", "odrl-").rpartition("/")[2].removesuffix("-v1")
+
+
+def allow_own_modules(*names: str | None) -> None:
+    """Let names such as `my_methods:warm-start` import modules of the current folder.
+
+    Only names that the user gives may import modules: a class named in a policy's file must not be
+    found in the same folder.
+    """
+    here = str(Path.cwd())
+    own = any(name and (":" in name or name.endswith(".toml")) for name in names)
+    if own and here not in sys.path:
+        sys.path.append(here)  # Worker processes inherit the path.
+
+
+def default_learner(env: EnvRef) -> str:
+    """Return the learner tuned on the env's family; for other envs, the ant's."""
+    return _ALL[env.id].learner if env.id in _ALL else "ppo-run"
+
+
+def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
+    """Return a vehicle's env with the options of studies, which put it back after a collision."""
+    if lenses and env.id not in VEHICLE_ENVS:
+        raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
+    if env.id not in _DRIVES:
+        return env
+    more: dict[str, Any] = {"lenses": list(lenses)} if lenses else {}
+    return EnvRef(env.id, {**env.kwargs, "put_back": True, **more})

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, overload
 import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 
-from shapechanger.envs.catalogue import CATALOGUE, find, find_task
+from shapechanger.envs.catalogue import CATALOGUE, find
 from shapechanger.envs.vector.env import ThreadVectorEnv
 from shapechanger.errors import UnknownName, VectorEnvError
 
@@ -173,7 +173,7 @@ def _known_id(env_id: str) -> str:
     in_full = "/" in env_id and not env_id.startswith("odrl/")
     if env_id in gym.registry or ":" in env_id or in_full:
         return env_id
-    return find_task(env_id) or find(env_id).id
+    return find(env_id).id
 
 
 def _cores() -> int:

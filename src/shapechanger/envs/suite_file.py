@@ -14,7 +14,7 @@ from typing import Any, Final
 import msgspec
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.naming import driven, env_ref, short_name
+from shapechanger.envs.catalogue import driven, env_ref, short_name
 from shapechanger.errors import StudyError, UnknownName
 from shapechanger.files import place_of, read_text
 from shapechanger.transfer.plan import TransferTask

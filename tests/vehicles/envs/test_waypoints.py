@@ -152,7 +152,7 @@ def test_the_measured_response_matches_the_geometry() -> None:
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize(
     ("vehicle", "sensed"),
-    [("car", True), *((vehicle, False) for vehicle, _ in WAYPOINT_ENVS.values())],
+    [("car", True), *((entry.kwargs["vehicle"], False) for entry in WAYPOINT_ENVS.values())],
 )
 def test_following_true_waypoints_has_no_collisions(vehicle: str, sensed: bool) -> None:
     with closing(WaypointEnv(vehicle, sensed=sensed, put_back=True)) as env:

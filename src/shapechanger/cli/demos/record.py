@@ -18,8 +18,7 @@ from shapechanger.demos.drivers import EXPERT, pilot_of, record_steps
 from shapechanger.demos.episodes import episode_at
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.demos.replay import play_in_env, write_episode_film
-from shapechanger.envs.catalogue import VEHICLE_ENVS
-from shapechanger.envs.naming import env_ref
+from shapechanger.envs.catalogue import VEHICLE_ENVS, env_ref
 from shapechanger.errors import DemosError, StudyError, check_seed
 from shapechanger.robot.client.recordings import play_on_robot
 from shapechanger.transfer.executor import use_one_thread
