@@ -29,15 +29,7 @@ _LONGEST_BODY: Final = 60
 
 
 def check_action(env: Any, action: Any) -> NDArray[Any]:
-    """Return an action as an array.
-
-    Args:
-        env: The env, which has an `action_layout`.
-        action: The action, of any dtype.
-
-    Raises:
-        BadAction: If it has another shape than the env's actions, or a number that is not finite.
-    """
+    """Return an action of any dtype as an array, or refuse its shape or numbers not finite."""
     name = type(env).__name__ if env.spec is None else env.spec.id
     try:
         array = np.asarray(action)
@@ -61,16 +53,9 @@ def check_action(env: Any, action: Any) -> NDArray[Any]:
 def check_actions(
     actions: Any, num_envs: int, shape: tuple[int, ...], ignored: NDArray[np.bool_]
 ) -> NDArray[Any]:
-    """Return the actions of many envs as one array of the action space's dtype.
+    """Return the actions of many envs as one array, or refuse them.
 
-    Args:
-        actions: One action per env.
-        num_envs: How many envs there are.
-        shape: Shape of one action.
-        ignored: Whether the action of each env is ignored, because the env is about to be reset.
-
-    Raises:
-        BadAction: If one has another shape or a number that is not finite.
+    Numbers that are not finite are accepted for envs in `ignored`, which are about to be reset.
     """
     try:
         given = np.asarray(actions)
@@ -97,17 +82,9 @@ _FIXED: Final = ("self", "arguments", "kwargs", "model_path", "observation_space
 def check_arguments(
     env: type[Any], family: str, own: Mapping[str, Any], arguments: Mapping[str, Any]
 ) -> None:
-    """Refuse arguments of an env that do not exist or have the wrong type.
+    """Refuse arguments that an env does not have, or that have the wrong type.
 
-    Args:
-        env: Class of the env; its Gymnasium base class defines the arguments.
-        family: Name of the family, for messages.
-        own: Arguments that all envs have in addition to Gymnasium's, with their defaults.
-        arguments: Arguments keyed by name.
-
-    Raises:
-        UnknownName: If there is no such argument.
-        EnvArgumentError: If one has the wrong type.
+    The env's Gymnasium base class defines the arguments and their defaults; `own` has more.
     """
     known: dict[str, Any] = dict(own)
     for base in reversed(env.__mro__):
@@ -138,12 +115,7 @@ def _mismatch(default: Any, value: Any) -> str:
 
 
 def require_same_boxes(envs: Sequence[gym.Env[Any, Any]]) -> None:
-    """Require Box spaces, and the same spaces and layouts of all envs.
-
-    Raises:
-        VectorEnvError: If a space is not a Box.
-        SpaceMismatch: If a space, or the names of its numbers, differ from the first env's.
-    """
+    """Require Box spaces, and the same spaces and names of numbers in all envs."""
     for side in ("observation", "action"):
         space, names = _space(envs[0], side)
         for number, env in enumerate(envs):
@@ -184,16 +156,7 @@ def describe_body(env: gym.Env[Any, Any]) -> str:
 
 
 def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
-    """Return one seed per env; a single number is the first env's, and the next envs count up.
-
-    Args:
-        seed: A number, one seed per env, or None.
-        num_envs: How many envs there are.
-
-    Raises:
-        VectorEnvError: If there are not as many seeds as envs, or one is not a whole number from 0
-            to 2^63 - 1.
-    """
+    """Return a seed or None per env; a single number is the first env's seed and counts up."""
     if seed is None:
         return [None] * num_envs
     given: Any = seed  # Not checked at run time.
@@ -213,16 +176,7 @@ def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> lis
 def masked_options(
     options: dict[str, Any] | None, num_envs: int
 ) -> tuple[NDArray[np.bool_] | None, dict[str, Any] | None]:
-    """Split the options of a reset into its mask, None for all envs, and the others.
-
-    Args:
-        options: Options, which may contain `reset_mask`.
-        num_envs: How many envs there are.
-
-    Raises:
-        TypeError: If the mask is not an array of booleans.
-        ValueError: If the mask has another shape, or is all false.
-    """
+    """Return `options["reset_mask"]`, None for all envs, and the other options."""
     if options is None or "reset_mask" not in options:
         return None, options
     given: Any = options["reset_mask"]

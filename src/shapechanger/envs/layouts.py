@@ -36,14 +36,10 @@ def position_features(model: mujoco.MjModel) -> list[Feature]:
 
 
 def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Feature]:
-    """Return a feature for each number of qvel.
+    """Return a feature for each number of qvel, clipped at a limit.
 
     `joint/velocity` for a hinge or slide; `body/vx` ... `body/wz` for a free joint: velocity in the
     world's frame, m/s, and angular velocity in the body's, rad/s.
-
-    Args:
-        model: The model.
-        limit: Absolute value at which the numbers are clipped.
     """
     features: list[Feature] = []
     for kind, element, _ in _joints(model):
@@ -62,13 +58,7 @@ def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Fe
 def contact_features(
     model: mujoco.MjModel, low: float = -math.inf, high: float = math.inf
 ) -> list[Feature]:
-    """Return six features per body except the world: clipped `cfrc_ext`, torque before force.
-
-    Args:
-        model: The model.
-        low: Lower clipping limit, N and N·m.
-        high: Upper clipping limit, N and N·m.
-    """
+    """Return six features per body except the world: `cfrc_ext`, N·m and N, torque before force."""
     quantities = {f"t{axis}": "N·m" for axis in "xyz"} | {f"f{axis}": "N" for axis in "xyz"}
     return _of_each_body(model, "contact", quantities, low, high)
 

@@ -40,11 +40,7 @@ def require_screen() -> None:
 
 
 def choose_gl() -> None:
-    """Set `MUJOCO_GL` to EGL or OSMesa if it is not set and there is no screen.
-
-    Raises:
-        RenderError: If neither is installed, or if the value of `MUJOCO_GL` disables drawing.
-    """
+    """Set `MUJOCO_GL` to EGL or OSMesa if it is not set and there is no screen."""
     chosen = os.environ.get("MUJOCO_GL", "")
     if chosen and chosen not in _LIBRARIES:
         raise _no_library(chosen)
@@ -68,13 +64,10 @@ def require_known_gl() -> None:
 
 
 def open_context(width: int, height: int) -> Any:
-    """Open a context for drawing without a window, of this size in pixels, and make it current.
+    """Open a context for drawing without a window, of a size in pixels, and make it current.
 
     `mujoco.GLContext` uses the value that `MUJOCO_GL` had when MuJoCo was imported; this function
-    uses the present value. MuJoCo raises errors late and of many kinds, and GLFW raises none.
-
-    Raises:
-        RenderError: If no context can be opened.
+    uses the present value.
     """
     library = os.environ.get("MUJOCO_GL") or "glfw"
     if library == "glfw":

@@ -88,11 +88,7 @@ def compiling(path: Path, verb: str = "compile") -> Generator[None]:
 
 @dataclass(frozen=True)
 class OwnFamily(Family):
-    """The bodies that edits make from a user's robot.
-
-    Attributes:
-        path: The file. Families are the same only if file and rig are the same.
-    """
+    """The bodies that edits make from a user's robot in the file `path`."""
 
     path: Path = Path()
 
@@ -106,10 +102,6 @@ class OwnFamily(Family):
 
         A file that a URDF names as `package://NAME/REST` is searched in each folder NAME that
         contains the URDF, or that lies next to a folder that contains the URDF.
-
-        Raises:
-            BrokenModel: If MuJoCo cannot read or compile it, or no folder has a file of a package.
-            MorphologyError: If the rig does not fit it.
         """
         with compiling(Path(path), "read"):
             spec = mujoco.MjSpec.from_file(str(path))
@@ -145,16 +137,9 @@ def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
 
 
 def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
-    """Return the family of a user's robot.
+    """Return the family of a user's robot, from its file or its name in `robot_descriptions`.
 
-    Args:
-        path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
-            `go2_mj_description`, which downloads it.
-        rig: Edits that are applied before those of any body.
-
-    Raises:
-        UnknownName: If there is no such file, or the package has no robot of this name.
-        MorphologyError: If the path is a folder, or the package is missing or fails.
+    The rig's edits are applied before those of any body.
     """
     file = Path(path).expanduser()
     if not file.is_file():

@@ -154,17 +154,9 @@ BUILT_IN: Final[Mapping[str, type[OwnTask]]] = {"walk": Walk}
 
 
 def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTask, str]:
-    """Return a task and its name for messages.
+    """Return a task and its name for messages; `OwnRobotEnv` lists the forms of a task.
 
-    Args:
-        task: Name of a built-in task; `module:Name` of a class or function; a class, a function or
-            an object.
-        options: Arguments of a class or of a built-in task.
-
-    Raises:
-        UnknownName: If there is no such task or name in the module.
-        TaskError: If the module cannot be imported, the class does not take the options, options
-            are given to an object or a function, or there is no reward.
+    Options are the arguments of a class or of a built-in task.
     """
     found = _found(task) if isinstance(task, str) else task
     name = task if isinstance(task, str) else getattr(task, "__qualname__", type(task).__qualname__)
@@ -210,11 +202,7 @@ def _found(name: str) -> Any:
 
 
 def reward_terms(task: OwnTask, name: str, robot: RobotState) -> dict[str, float]:
-    """Return the terms of the reward of a step of a task, with its name.
-
-    Raises:
-        TaskError: If they are not a dict of finite numbers.
-    """
+    """Return the terms of the reward of a step, or refuse them unless they are finite numbers."""
     given: Any = task.reward(robot)
     if not isinstance(given, Mapping):
         raise TaskError(
@@ -245,11 +233,7 @@ def has_ended(task: OwnTask, name: str, robot: RobotState) -> bool:
 
 
 def observed(task: OwnTask) -> Sequence[str] | None:
-    """Return the names and globs that a task observes; None for the default.
-
-    Raises:
-        TaskError: If they are not a sequence of names.
-    """
+    """Return the names and globs that a task observes, None for the default, or refuse them."""
     given: Any = getattr(task, "observe", None)
     names: list[Any] = [] if given is None or isinstance(given, str) else list(given)
     if given is not None and not (names and all(isinstance(each, str) for each in names)):

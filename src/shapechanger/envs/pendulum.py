@@ -237,11 +237,7 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
 
 
 def _foot_and_length(model: mujoco.MjModel) -> tuple[float, float]:
-    """Return the height of the first hinge, and of the tip above it with both poles upright, m.
-
-    Raises:
-        MorphologyError: If the model is not a double pendulum.
-    """
+    """Return the height of the first hinge, and of the tip above it with both poles upright, m."""
     if tuple(model.jnt_type) == _CART_AND_POLES and model.nsite > 0:
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)

@@ -44,17 +44,10 @@ class Renderer(MujocoRenderer):
     OpenGL draws into and deletes from the current context. Gymnasium makes a context current only
     when it is new, so one of two envs renders black frames, and closing one deletes the textures of
     the other. It also terminates GLFW with all windows, and its free camera does not follow the
-    robot.
+    robot. Here a free camera follows the body with the number `follow`; with None it is fixed.
 
     Without a GPU, shadows, reflections and smoothed edges take nearly all of the time of a small
-    frame; a window always has them.
-
-    Args:
-        *arguments: Arguments of Gymnasium's renderer.
-        shadows: Whether frames have shadows, reflections and smoothed edges; None draws them in
-            frames of more than 256 x 256 pixels.
-        follow: Number of the body that a free camera follows; None for a fixed camera.
-        **more: Further arguments of Gymnasium's renderer.
+    frame: by default, only frames of more than 256 x 256 pixels have them. A window always does.
     """
 
     _viewers: dict[str, Any]
@@ -75,16 +68,7 @@ class Renderer(MujocoRenderer):
         weakref.finalize(self, _free, self._viewers).atexit = False
 
     def render(self, render_mode: str | None, markers: Sequence[dict[str, Any]] = ()) -> Any:
-        """Return a frame of `render_mode`, as Gymnasium's renderer does.
-
-        Args:
-            render_mode: The mode.
-            markers: Shapes to draw in addition to the model, as arguments of `add_marker` of
-                Gymnasium's viewers.
-
-        Raises:
-            RenderError: If rendering does not work on this machine.
-        """
+        """Return a frame like Gymnasium's renderer; markers are arguments of its `add_marker`."""
         if render_mode != "human":
             _require_context()
         try:
@@ -176,19 +160,10 @@ def body_reach(model: mujoco.MjModel, pose: _Floats) -> float:
 def draw(
     model: mujoco.MjModel, pose: _Floats, width: int, height: int, reach: float
 ) -> NDArray[np.uint8]:
-    """Return an image of a body, shape (height, width, 3).
+    """Return an image of a body in a pose (nq,), shape (height, width, 3).
 
-    Bodies drawn with the same reach have the same scale.
-
-    Args:
-        model: Model of the body, with a sky and a light; see `prepare_scene`.
-        pose: Its pose, (nq,).
-        width: Width in pixels.
-        height: Height in pixels.
-        reach: Radius in view around the middle of the body, m.
-
-    Raises:
-        RenderError: If the size is out of range, or nothing can be drawn here.
+    `reach` is the radius in view around the middle of the body, m: bodies drawn with the same reach
+    have the same scale. The model has a sky and a light, see `prepare_scene`.
     """
     if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
         raise RenderError(
@@ -244,17 +219,14 @@ def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
     """Improve the appearance of a model's floor, lights and sky, without effect on the physics.
 
     Sensors are not affected either: range finders detect a geom by its opacity, which is unchanged.
+    Planes without a material are drawn only with `bare_floors`; the double pendulum has such a
+    plane, far below it.
 
     Gymnasium's floors are black and white and mirror half of the light: they distract from the
     body, and flicker towards the horizon; in frames with shadows they turn green, and the shadows
     are black. Its lights are lower than large bodies, and their shadow maps, which do not follow a
     body that walks, leave dark stripes far from it. The pendulums' models have no sky, and most
     have no light: their frames would be dark shapes on black.
-
-    Args:
-        spec: The model.
-        bare_floors: Whether planes without a material are drawn. The double pendulum has such a
-            plane, far below it.
     """
     for texture in spec.textures:
         if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:
@@ -288,9 +260,8 @@ def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
 def halve_textures(spec: mujoco.MjSpec) -> None:
     """Halve the width and height of all procedural textures of bodies and skies.
 
-    They take most of the memory of a compiled model: 0.47 of 0.53 MB of Gymnasium's ant, and 0.12
-    MB if halved.
-    Floors are not changed, because the edges of their tiles would blur.
+    They take most of the memory of a compiled model: 0.47 of 0.53 MB of Gymnasium's ant, 0.12 MB if
+    halved. Floors are not changed, because the edges of their tiles would blur.
     """
     for texture in spec.textures:
         if texture.builtin and texture.type != mujoco.mjtTexture.mjTEXTURE_2D:

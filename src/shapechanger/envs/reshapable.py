@@ -100,16 +100,7 @@ class Reshapable(MujocoEnv):
     _starting: bool = False  # Whether a start state is being drawn.
 
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
-        """Prepare what Gymnasium's constructor needs to compile the model.
-
-        Args:
-            body: The body to compile.
-            arguments: Arguments of the env; those that Gymnasium's env lacks are removed.
-
-        Raises:
-            UnknownName: If an argument or the body does not exist.
-            EnvArgumentError: If an argument has the wrong type.
-        """
+        """Store the arguments that Gymnasium's env lacks, and prepare to compile the body."""
         check_arguments(type(self), self.family.name, _OWN_ARGUMENTS, arguments)
         own = {name: arguments.pop(name, default) for name, default in _OWN_ARGUMENTS.items()}
         self._own_arguments: dict[str, Any] = own
@@ -258,12 +249,7 @@ class Reshapable(MujocoEnv):
         return bool(cast("Any", self.data.warning).number[BAD_STATE].any())
 
     def reset_model(self) -> NDArray[np.float64]:
-        """Draw a start state as Gymnasium does, and make it feasible.
-
-        Joints that the noise moved beyond their limits are moved back, orientations are normalised,
-        equalities such as coupled joints and closed loops are satisfied, and a trunk whose feet the
-        noise pushed into the floor is lifted.
-        """
+        """Draw a start state as Gymnasium does, and make it feasible, see `StartRules.feasible`."""
         self._starting = True
         try:
             return self._draw_start()
@@ -356,11 +342,7 @@ class Reshapable(MujocoEnv):
     def certify_shift(
         source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
     ) -> Certificate:
-        """Compare the envs of a transfer, including their wrappers; both are reset.
-
-        Raises:
-            EmptyShift: If they do not differ and `allow_empty` is false.
-        """
+        """Compare the envs of a transfer, including their wrappers; both are reset."""
         return certify(source, target, allow_empty=allow_empty)
 
     @property

@@ -42,12 +42,7 @@ def to_json(body: Iterable[Edit]) -> str:
 
 
 def from_json(text: str | bytes) -> Body:
-    """Read a body from JSON as `to_json` writes it; a single object is a body of one edit.
-
-    Raises:
-        UnknownName: If there is no edit of a kind, or no field of a name.
-        MorphologyError: If the text is not such a list, or a number is out of its range.
-    """
+    """Read a body from JSON as `to_json` writes it; a single object is a body of one edit."""
     try:
         # A text that was read from a file may begin with a byte-order mark.
         parsed: Any = json.loads(text.removeprefix("\ufeff") if isinstance(text, str) else text)
@@ -57,12 +52,7 @@ def from_json(text: str | bytes) -> Body:
 
 
 def as_body(value: Edit | Iterable[Edit] | str) -> Body:
-    """Return a body from one edit, several, or their JSON, which may be parsed already.
-
-    Raises:
-        UnknownName: As for `from_json`.
-        MorphologyError: If `value` is something else.
-    """
+    """Return a body from one edit, several, or their JSON, which may be parsed already."""
     if isinstance(value, str):
         return from_json(value)
     given: Any = value  # Not checked at run time.
@@ -207,10 +197,8 @@ class Axis:
     Attributes:
         name: Name of the number, such as "length of shank_4".
         edit: Function from a value of the number to the edit that sets it.
-        low: Smallest value of the training bodies.
-        high: Largest value of the training bodies.
-        lowest: Smallest value of all bodies.
-        highest: Largest value of all bodies.
+        low: Smallest value of the training bodies; `high` is their largest.
+        lowest: Smallest value of all bodies; `highest` is their largest.
         unit: Its unit; "1" for a ratio to the model's own value.
     """
 
@@ -247,25 +235,13 @@ class Family:
     rig: Body = ()
 
     def load(self, path: str | Path) -> mujoco.MjSpec:
-        """Load the model at `path` with the rig, and name all its elements.
-
-        Raises:
-            MorphologyError: If the rig does not fit it.
-        """
+        """Load the model at `path` with the rig, and name all its elements."""
         spec = mujoco.MjSpec.from_file(str(path))
         name_elements(spec, self.bodies_by_joint)
         return reshape(spec, self.rig) if self.rig else spec
 
     def body(self, value: BodyLike) -> Body:
-        """Return the edits of a body.
-
-        Args:
-            value: Name of a body of this family, edits as JSON, one edit, or several.
-
-        Raises:
-            UnknownName: If the family has no body of this name.
-            MorphologyError: If `value` is not a valid body.
-        """
+        """Return the edits of a body of this family from its name, JSON, one edit, or several."""
         if isinstance(value, str) and not value.lstrip().startswith(("[", "{")):
             return as_body(self._named("body", value, {**self.bodies, **self.published}))
         return as_body(value)
@@ -278,13 +254,7 @@ class Family:
     def body_at(self, values: Mapping[str, float], parts: Mapping[str, str] | None = None) -> Body:
         """Return the body with some values of the family's axes; the other axes are unedited.
 
-        Args:
-            values: Value of each axis, by its name.
-            parts: Name of the part at each place where it replaces the model's own part.
-
-        Raises:
-            UnknownName: If the family has no such axis, place or part.
-            MorphologyError: If a value lies beyond its axis.
+        `parts` names the part at each place where it replaces the model's own part.
         """
         edits: list[Edit] = []
         for place, part in (parts or {}).items():
@@ -350,10 +320,9 @@ class Family:
 
 
 def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, ...]:
-    """Return an axis for the length of each of these bodies.
+    """Return an axis for the length of each of these bodies, as a factor of the model's length.
 
-    The training range is `low` to `high` times the model's length. The whole range begins 0.3 lower
-    and ends 0.4 higher.
+    The whole range begins 0.3 below the training range, and ends 0.4 above it.
     """
     return tuple(
         Axis(f"length of {body}", partial(Stretch, body), low, high, low - 0.3, high + 0.4)

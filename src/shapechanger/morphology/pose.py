@@ -172,7 +172,7 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
 
 
 def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
-    """Return a pose (nq,) with the trunk moved up or down until the lowest point is on the floor.
+    """Return a pose (nq,) with the trunk raised or lowered until its lowest point is on the floor.
 
     The pose is returned unchanged if no joint raises the trunk or no floor is below it.
     """
@@ -185,13 +185,8 @@ def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
 def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float | None:
     """Return the world height of the trunk's origin when the lowest point touches the floor, m.
 
-    Args:
-        model: The body.
-        pose: The pose (nq,) in which it stands; by default each joint is in the middle of its range
-            and the trunk upright.
-
-    Returns:
-        None for a body that no joint raises or that has no floor to stand on.
+    Without a pose (nq,), each joint is in the middle of its range and the trunk upright. A body
+    that no joint raises, or that has no floor to stand on, has no height: None.
     """
     rules = StartRules(model)
     if rules.lift is None:
@@ -221,9 +216,6 @@ def _posed(model: mujoco.MjModel, pose: _Array) -> mujoco.MjData:
 
 class StartRules:
     """Rules for feasible start poses, read from a model once.
-
-    Args:
-        model: The model.
 
     Attributes:
         lift: The coordinate that raises the trunk; see `trunk_lift`.

@@ -70,8 +70,6 @@ class Tree(msgspec.Struct, frozen=True):
             travel is the world.
         numbers: Description of the trunk, see `TRUNK_NUMBERS`.
         limbs: Its limbs, each after the limb that carries it.
-        trunk_numbers: Names of the numbers of the trunk.
-        limb_numbers: Names of the numbers of each limb.
     """
 
     trunk: tuple[str, ...]

@@ -39,14 +39,9 @@ _UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhf
 def find_fast_model(
     model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
 ) -> mujoco.MjModel | None:
-    """Return a cheaper model that steps the data of another and moves equally.
+    """Return a cheaper model that steps the data of another and moves equally, None if not known.
 
-    Args:
-        model: The compiled, unedited model.
-        make_spec: Returns the spec that the model was compiled from.
-
-    Returns:
-        The fast model; None if no cheaper model is known to move equally.
+    `make_spec` returns the spec of the model, which is compiled and unedited.
     """
     # Other models may have constraints in several trees, or elements that the rules do not cover.
     if (
@@ -142,10 +137,6 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
 
     In some starts the trunk is thrown and turned over, in others sunk into the floor, so that geoms
     touch it and joints reach their limits. Every pair that can collide must have touched.
-
-    Args:
-        model: The original model.
-        other: The model that is to replace it.
     """
     rng = np.random.default_rng(_SEED)
     one, two = mujoco.MjData(model), mujoco.MjData(model)

@@ -37,11 +37,8 @@ class PausedClock:
     """Steps the physics while MuJoCo's profiling clock is paused, for all threads.
 
     A step of an ant reads the clock hundreds of times to fill `data.timer`, on which no other
-    number depends. `mujoco.set_mjcb_time(None)` installs the clock again, so its pointer is set. A
-    clock that a user installs is kept.
-
-    Args:
-        clock: Pointer to the clock function.
+    number depends. `mujoco.set_mjcb_time(None)` installs the clock again, so the pointer to it is
+    set. A clock that a user installs is kept.
     """
 
     def __init__(self, clock: ctypes.c_void_p) -> None:
@@ -117,13 +114,7 @@ class ModelWatch:
 
     It compares all options and statistics, and the memory of every array except the pixels of
     textures, which do not affect the physics. So no field can be forgotten, and restoring a field
-    is detected too.
-
-    Attributes:
-        model: The watched model, kept alive because the memory of its arrays is read.
-        digest: Hash of the model when the watch was created.
-        shared: Data that equal models share.
-        timestep: Timestep of the model when the watch was created, s.
+    is detected too. The model is kept alive because the memory of its arrays is read.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -157,11 +148,8 @@ class Binding:
     """Views of one `MjData`, and the model that steps it.
 
     Attributes:
-        watch: Watch of the public model.
-        model: The public model.
         stepping: The model that steps the data: the public model or its fast model.
         has_fast_model: Whether `stepping` is a fast model; None until the search for one.
-        shape: Shape of an action.
         dt: Duration of a step while the model is unedited, s.
         warnings: View of MuJoCo's counts of bad positions, velocities and accelerations, (3,).
         kind: One call of `conclude` serves all envs of the same kind; empty for an env that must
@@ -249,34 +237,17 @@ class TunedStep(Reshapable):
             self._bound.kind = None
 
     def render(self) -> Any:
-        """Return a frame, or None if a window shows it.
-
-        Raises:
-            ResetNeeded: If the env has not been reset.
-            RenderError: If nothing can be drawn here.
-        """
+        """Return a frame, or None if a window shows it; the env must have been reset."""
         self._require_reset("render")
         return cast("Any", super()).render()
 
     def step(self, action: Any) -> StepResult:
-        """Take one step.
-
-        Args:
-            action: Shape (nu,), finite.
-
-        Raises:
-            ResetNeeded: If the env has not been reset.
-            BadAction: If the action has another shape or is not finite; the state is unchanged.
-        """
+        """Take one step with an action, shape (nu,), finite; a refused action changes nothing."""
         bound = self._ready()
         return super().step(action) if bound is None else self._advance(bound, action)
 
     def ready_together(self) -> Any:
-        """Return the binding for a step together with other envs; None if `step` must be called.
-
-        Raises:
-            ResetNeeded: If the env has not been reset.
-        """
+        """Return the binding for a step together with other envs; None if `step` must be called."""
         if type(self).step is not TunedStep.step or "step" in vars(self):
             return None  # `step` is overridden.
         bound = self._ready()
@@ -302,11 +273,8 @@ class TunedStep(Reshapable):
     ) -> Outcomes:
         """Compute the results of envs of this kind after their physics has stepped.
 
-        Args:
-            bounds: The binding of each env.
-            before: Result of `remember` of each binding before the step.
-            actions: The action of each env, a row each.
-            out: Array to write the observations into; None for a new one.
+        `before` has the result of `remember` of each binding before the step, and `actions` has a
+        row per env. Observations are written into `out` unless it is None.
         """
         raise NotImplementedError
 

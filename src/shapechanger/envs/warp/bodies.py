@@ -44,13 +44,7 @@ class DeviceBody(NamedTuple):
 
 
 def device_body(name: str, model: mujoco.MjModel, constants: Rows) -> DeviceBody:
-    """Read a compiled body, as mujoco-warp reads it.
-
-    Args:
-        name: Its name or edits, for messages.
-        model: The compiled model.
-        constants: Numbers of the task that depend on the body.
-    """
+    """Read a compiled body, as mujoco-warp reads it; other arguments as for `DeviceBody`."""
     with on("cpu"):
         made = mjw.put_model(model)
     rows: dict[str, NDArray[Any]] = {}

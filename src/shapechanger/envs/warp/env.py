@@ -214,9 +214,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     def _start(self, mask: Tensor) -> tuple[list[Tensor], dict[str, Tensor]]:
         """Start an episode in the worlds of a mask, shape (n,).
 
-        Returns:
-            Observations of each batch, and infos of all worlds; rows outside the mask are of the
-            present state.
+        Return the observations of each batch, and the infos of all worlds; rows outside the mask
+        are of the present state.
         """
         every = mask, self._seeds, self._episodes
         starts = self._each(lambda batch: batch.start(*[self._rows(batch, one) for one in every]))

@@ -85,14 +85,11 @@ def _draw(
 def uniforms(
     seeds: Tensor, episodes: Tensor, stream: int | Tensor, count: int, *, normal: bool = False
 ) -> Tensor:
-    """Return numbers in [0, 1), shape (n, count), float64.
+    """Return numbers in [0, 1), or normally distributed ones, shape (n, count), float64.
 
-    Args:
-        seeds: The seed of each world, shape (n,), int64.
-        episodes: How many episodes each world has begun, shape (n,), int64.
-        stream: Number of an independent stream of the episode, or one per world, shape (n,), int64.
-        count: How many numbers a world gets.
-        normal: Whether they are normally distributed (Box and Muller) instead.
+    `seeds` and `episodes`, (n,), int64, are the seed of each world and how many episodes it has
+    begun. `stream` is the number of an independent stream of the episode; an array has one per
+    world, (n,), int64.
     """
     numbers = torch.empty((len(seeds), count), dtype=torch.float64, device=seeds.device)
     if isinstance(stream, int):
@@ -109,11 +106,7 @@ def uniforms(
 
 
 def follow_mujoco() -> None:
-    """Let mujoco-warp's kernels, which are built later, use the functions of this module.
-
-    Raises:
-        VectorEnvError: If another version is installed.
-    """
+    """Let mujoco-warp's kernels, which are built later, use the functions of this module."""
     if not (found := version("mujoco-warp")).startswith(VERSION):
         raise VectorEnvError(
             f"backend='warp' corrects functions of mujoco-warp {VERSION}x, and {found} is "

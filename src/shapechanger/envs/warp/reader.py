@@ -26,16 +26,9 @@ MakeWorlds = Callable[..., Worlds]
 
 
 class BodyReader:
-    """Compiles bodies of a family, and reads their arrays for a device.
+    """Compiles bodies of a family with CPU envs, and reads their arrays for a device.
 
-    Args:
-        task: The batched functions of the task.
-        first: A CPU env of the task.
-        make: Makes a CPU env of the task from arguments.
-        arguments: Arguments of the CPU env.
-
-    Attributes:
-        spec: The spec of the CPU env, with its time limit.
+    `make` makes a CPU env of the task from its arguments; `first` is one of them.
     """
 
     def __init__(
@@ -56,11 +49,7 @@ class BodyReader:
         return self._usual if value is None else self._envs[0].family.body(value)
 
     def read(self, body: Any) -> tuple[DeviceBody, MakeWorlds]:
-        """Compile a body, and return it with the maker of a batch that begins with it.
-
-        Raises:
-            ShapechangerError: If the body cannot be built, or a device cannot simulate it.
-        """
+        """Compile a body, and return it with the maker of a batch that begins with it."""
         env = self._env_with(body)
         model = env.model
         if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
@@ -101,16 +90,7 @@ def register_reader(env_class: type, reader: _MakeReader) -> None:
 
 
 def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyReader:
-    """Return the reader of a task's bodies.
-
-    Args:
-        env_id: Full id of the task.
-        make: Makes a CPU env of it from arguments.
-        arguments: Arguments of the CPU env.
-
-    Raises:
-        VectorEnvError: If the task has no batched functions, or mujoco-warp has another version.
-    """
+    """Return the reader of a task's bodies; arguments as for `BodyReader`."""
     follow_mujoco()
     first = make(arguments)
     for module in {task.device for task in FINGER_ENVS.values()}:
@@ -133,11 +113,7 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
 def grouped(reader: BodyReader, bodies: Sequence[Any], num_envs: int) -> list[MakeWorlds]:
     """Compile bodies, assign them to worlds in turn, and group worlds by the shapes of arrays.
 
-    Returns:
-        One function per group, which makes its `Worlds` from the arguments from `device` on.
-
-    Raises:
-        VectorEnvError: If there are fewer worlds than shapes.
+    Return a function per group, which makes its `Worlds` from the arguments from `device` on.
     """
     kinds: list[tuple[MakeWorlds, dict[Any, DeviceBody]]] = []
     for body in dict.fromkeys(bodies):

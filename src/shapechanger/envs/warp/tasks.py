@@ -55,10 +55,6 @@ class DeviceTask(Worlds):
     Attributes:
         normal_velocities: Whether start velocities are drawn normally; if not, uniformly.
         place_size: How many coordinates of the trunk the rewards and infos read, 0 to 2.
-
-    Raises:
-        VectorEnvError: If the body starts above a geom that is not a plane, or a geom that can
-            touch the floor has a shape without a batched clearance.
     """
 
     normal_velocities: ClassVar[bool] = False

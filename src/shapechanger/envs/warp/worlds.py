@@ -56,8 +56,8 @@ class Worlds(ABC):
     `qpos` (n, nq), `qvel`, `qacc`, `qfrc_actuator` and `qfrc_constraint` (n, nv), `ctrl` and
     `actuator_force` (n, nu), `act` (n, na), `history` (n, nhistory), `time` (n,), `xpos` and
     `xipos` (n, nbody, 3), `cinert` (n, nbody, 10), `cvel` and `cfrc_ext` (n, nbody, 6),
-    `ten_length` and `ten_velocity` (n, ntendon), `site_xpos` (n, nsite, 3), `geom_xpos`
-    (n, ngeom, 3) and `geom_xmat` (n, ngeom, 3, 3).
+    `ten_length` and `ten_velocity` (n, ntendon), `site_xpos` (n, nsite, 3),
+    `geom_xpos` (n, ngeom, 3) and `geom_xmat` (n, ngeom, 3, 3).
 
     Args:
         env: A CPU env of the task, which reads the bodies.
@@ -73,15 +73,8 @@ class Worlds(ABC):
             for; a missing number is the largest possible one.
 
     Attributes:
-        count: How many worlds there are.
-        bodies: The bodies that the worlds can have, keyed by their edits.
         chosen: The body of each world, an index of `bodies`, shape (n,).
         constants: Numbers of the task of each world's body, shape (n, ...).
-        limits: How many contacts and rows of constraints a world has memory for.
-        observation_layout: Name, unit and range of each number of an observation.
-        action_layout: Name, unit and range of each number of an action.
-        single_observation_space: Space of one world's observations, float32.
-        single_action_space: Space of one world's actions.
         precision: Type of the constants.
         contact_forces: Whether the task reads `cfrc_ext`.
         start_forces: Whether the first observation reads forces.
@@ -159,9 +152,7 @@ class Worlds(ABC):
     def outcome(self, before: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Infos]:
         """Return rewards, shape (n,), terminations, (n,), and infos of a step.
 
-        Args:
-            before: Result of `place` before the physics.
-            actions: Shape (n, nu).
+        `before` is the result of `place` before the physics; actions have the shape (n, nu).
         """
 
     def start_infos(self) -> Infos:
@@ -195,11 +186,8 @@ class Worlds(ABC):
         """Replace the bodies that worlds can have; worlds with another one must start again.
 
         The numbers of all bodies stay on the device, from which `_choose` gathers. A field of the
-        model gets a row per world as soon as two bodies differ in it.
-
-        Args:
-            bodies: The bodies, keyed by their edits.
-            each: The edits of each world's body.
+        model gets a row per world as soon as two bodies differ in it. Bodies are keyed by their
+        edits, and `each` has the edits of each world's body.
         """
         self.bodies = bodies
         held = [*bodies.values()]
@@ -247,17 +235,11 @@ class Worlds(ABC):
         self._warm.clear()  # Some kernels depend on which arrays are wide.
 
     def step(self, actions: Tensor) -> tuple[Tensor, dict[str, Tensor], Infos]:
-        """Take one step of the task in each world.
+        """Take one step of the task in each world, with actions of shape (n, nu).
 
         A world whose simulation has diverged is terminated with the reward 0, and put back to its
-        pose at rest at once, so that only its own results are lost.
-
-        Args:
-            actions: Shape (n, nu).
-
-        Returns:
-            Observations, shape (n, size); `rewards`, `terminated` and `diverged`, shape (n,) each;
-            and infos.
+        pose at rest at once, so that only its own results are lost. Return observations,
+        shape (n, size); `rewards`, `terminated` and `diverged`, shape (n,) each; and infos.
         """
         actions = actions.detach()
         self.apply(actions)
@@ -276,15 +258,9 @@ class Worlds(ABC):
         return observations, {**ends, "diverged": diverged}, infos
 
     def start(self, mask: Tensor, seeds: Tensor, episodes: Tensor) -> tuple[Tensor, Infos]:
-        """Start an episode in some worlds.
+        """Start an episode in the worlds of a mask, shape (n,); other arguments as for `uniforms`.
 
-        Args:
-            mask: Which worlds, shape (n,).
-            seeds: The seed of each world, shape (n,).
-            episodes: How many episodes each world has begun, shape (n,).
-
-        Returns:
-            Observations, shape (n, size), and infos; only the rows of `mask` are of the start.
+        Return observations, shape (n, size), and infos; only the rows of the mask are of the start.
         """
         self._clear(mask)
         if self._redraws:

@@ -75,8 +75,7 @@ def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
 def select_limbs(spec: mujoco.MjSpec, pattern: str, change: str) -> Iterator[mujoco.MjsBody]:
     """Yield the bodies that match, except those that the change has removed in the meantime.
 
-    The change, such as "cut", is for the message that refuses a trunk: a body on the world, which
-    carries the whole robot.
+    The message that refuses a trunk, a body on the world, names the change, such as "cut".
     """
     for name in [body.name for body in select("body", pattern, spec.bodies[1:])]:
         if (body := spec.body(name)) is None:
@@ -101,10 +100,6 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
 
     A body is named after `bodies_by_joint`, or its joint, or its parent; an actuator after the
     element that it drives; anything else after its body. Names change no physics.
-
-    Args:
-        spec: The model.
-        bodies_by_joint: Names for unnamed bodies by the names of their joints.
     """
     chosen = bodies_by_joint or {}
     free = unique_namer(body.name for body in spec.bodies)
@@ -279,7 +274,7 @@ def _copy_whole(
 def move(spec: mujoco.MjSpec, element: Any, parent: mujoco.MjsBody) -> Any:
     """Attach a limb or a point to another body, with the same name and pose in the body's frame.
 
-    The new element is returned; the old handle is invalid.
+    Return the new element; the old handle is invalid.
     """
     # References are by name: after renaming, they refer to the copies.
     for each in whole(element):

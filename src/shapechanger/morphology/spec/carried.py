@@ -87,12 +87,7 @@ def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
 
 
 class Keyframes:
-    """The keyframes of a specification, removed from it while edits are applied.
-
-    Args:
-        spec: The specification.
-        model: The model that it compiles to; not needed without keyframes.
-    """
+    """The keyframes of a specification, removed from it while edits are applied."""
 
     def __init__(self, spec: mujoco.MjSpec, model: Any) -> None:
         # For each keyframe: name and time, the given fields, and numbers by field and element name.
