@@ -25,7 +25,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 
 from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN
 from shapechanger.envs.checks import check_action
-from shapechanger.envs.layouts import contact_features, position_features, velocity_features
+from shapechanger.envs.layouts import body_features, position_features, velocity_features
 from shapechanger.envs.odrl import published
 from shapechanger.envs.stepping.tuned import (
     NO_WARNINGS,
@@ -369,7 +369,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         features = position_features(model)[2 if self.place_hidden else 0 :]
         features += velocity_features(model)
         if self.contacts_observed:
-            features += contact_features(model, *self._force_range)
+            features += body_features(model, "contact", *self._force_range)
         return features
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 import mujoco
@@ -13,6 +13,15 @@ from shapechanger.layout import Element, Feature, Layout
 _J = mujoco.mjtJoint
 _POSITION_UNIT: Final = {_J.mjJNT_SLIDE: "m", _J.mjJNT_HINGE: "rad"}
 _FORCE_UNIT: Final = {_J.mjJNT_SLIDE: "N", _J.mjJNT_HINGE: "N·m"}
+# The quantities of each block of numbers of a body, with their units.
+_OF_BODIES: Final = {
+    "contact": {f"t{axis}": "N·m" for axis in "xyz"} | {f"f{axis}": "N" for axis in "xyz"},
+    "inertia": {
+        **dict.fromkeys(("xx", "yy", "zz", "xy", "xz", "yz"), "kg·m²"),
+        **{"mx": "kg·m", "my": "kg·m", "mz": "kg·m", "mass": "kg"},
+    },
+    "twist": {f"w{axis}": "rad/s" for axis in "xyz"} | {f"v{axis}": "m/s" for axis in "xyz"},
+}
 
 
 def position_features(model: mujoco.MjModel) -> list[Feature]:
@@ -55,33 +64,23 @@ def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Fe
     return features
 
 
-def contact_features(
-    model: mujoco.MjModel, low: float = -math.inf, high: float = math.inf
+def body_features(
+    model: mujoco.MjModel, block: str, low: float = -math.inf, high: float = math.inf
 ) -> list[Feature]:
-    """Return six features per body except the world: `cfrc_ext`, N·m and N, torque before force."""
-    quantities = {f"t{axis}": "N·m" for axis in "xyz"} | {f"f{axis}": "N" for axis in "xyz"}
-    return _of_each_body(model, "contact", quantities, low, high)
+    """Return features `body/block/quantity` of each body except the world, in world axes.
 
-
-def inertia_features(model: mujoco.MjModel) -> list[Feature]:
-    """Return ten features per body except the world: MuJoCo's `cinert`, in world axes.
-
-    `body/inertia/xx` ... `yz`: its inertia about the centre of mass of the whole model, kg·m²; `mx`
-    to `mz`: its mass times its distance from there, kg·m; and `mass`, kg.
+    - `contact` is MuJoCo's `cfrc_ext`: torques `tx` ... `tz`, N·m, and forces `fx` ... `fz`, N.
+    - `inertia` is `cinert`: `xx` ... `yz`, the inertia about the centre of mass of the whole model,
+      kg·m²; `mx` to `mz`, the mass times its distance from there, kg·m; and `mass`, kg.
+    - `twist` is `cvel`: the angular velocity `wx` ... `wz`, rad/s; and `vx` ... `vz`, the velocity
+      at the centre of mass of the whole model, m/s.
     """
-    quantities = {axes: "kg·m²" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")}
-    quantities |= {"mx": "kg·m", "my": "kg·m", "mz": "kg·m", "mass": "kg"}
-    return _of_each_body(model, "inertia", quantities)
-
-
-def twist_features(model: mujoco.MjModel) -> list[Feature]:
-    """Return six features per body except the world: MuJoCo's `cvel`, in world axes.
-
-    `body/twist/wx` ... `wz`: its angular velocity, rad/s. `vx` ... `vz`: its velocity at the centre
-    of mass of the whole model, m/s.
-    """
-    quantities = {f"w{axis}": "rad/s" for axis in "xyz"} | {f"v{axis}": "m/s" for axis in "xyz"}
-    return _of_each_body(model, "twist", quantities)
+    names = [model.body(b).name for b in range(1, model.nbody)]
+    return [
+        Feature(f"{name}/{block}/{quantity}", unit, low, high, Element("body", name))
+        for name in names
+        for quantity, unit in _OF_BODIES[block].items()
+    ]
 
 
 def drive_features(model: mujoco.MjModel) -> list[Feature]:
@@ -145,19 +144,3 @@ def _joints(model: mujoco.MjModel) -> Iterator[tuple[mujoco.mjtJoint, Element, i
         kind, body = _J(model.jnt_type[j]), model.body(model.jnt_bodyid[j]).name
         is_axis = kind in _POSITION_UNIT
         yield kind, Element("joint", model.joint(j).name) if is_axis else Element("body", body), j
-
-
-def _of_each_body(
-    model: mujoco.MjModel,
-    block: str,
-    quantities: Mapping[str, str],
-    low: float = -math.inf,
-    high: float = math.inf,
-) -> list[Feature]:
-    """Return features `body/block/quantity` for each body except the world, and each quantity."""
-    names = [model.body(b).name for b in range(1, model.nbody)]
-    return [
-        Feature(f"{name}/{block}/{quantity}", unit, low, high, Element("body", name))
-        for name in names
-        for quantity, unit in quantities.items()
-    ]

@@ -105,7 +105,8 @@ def make_vec(
         raise VectorEnvError(f"There are {count} envs and {len(bodies)} bodies.")
     if backend not in _REFUSED:
         raise UnknownName("backend", backend, _REFUSED)
-    made_from, mode = _known_id(env_id), _mode(autoreset_mode, backend)
+    mode = _mode(autoreset_mode, backend)
+    made_from = env_id if env_id in gym.registry or ":" in env_id else find(env_id).id
     own = {"threads": threads, "device": device, "bodies": bodies, "pool": pool}
     own |= {"nconmax": nconmax, "njmax": njmax}
     recorded: dict[str, Any] = {name: value for name, value in own.items() if value is not None}
@@ -166,14 +167,6 @@ def _make(env_id: str, arguments: dict[str, Any]) -> gym.Env[Any, Any]:
         return gym.make(env_id, **arguments)
     except (gym.error.UnregisteredEnv, ModuleNotFoundError) as error:
         raise UnknownName("environment", env_id, CATALOGUE) from error
-
-
-def _known_id(env_id: str) -> str:
-    """Return the full id of a name such as `BigAnt` or `odrl/ant-friction-0.5`."""
-    in_full = "/" in env_id and not env_id.startswith("odrl/")
-    if env_id in gym.registry or ":" in env_id or in_full:
-        return env_id
-    return find(env_id).id
 
 
 def _cores() -> int:

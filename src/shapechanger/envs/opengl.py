@@ -42,8 +42,7 @@ def require_screen() -> None:
 def choose_gl() -> None:
     """Set `MUJOCO_GL` to EGL or OSMesa if it is not set and there is no screen."""
     chosen = os.environ.get("MUJOCO_GL", "")
-    if chosen and chosen not in _LIBRARIES:
-        raise _no_library(chosen)
+    _require_in(("", *_LIBRARIES), chosen)
     if chosen or has_screen():
         return
     installed = {"egl": "EGL", "osmesa": "OSMesa"}
@@ -58,9 +57,15 @@ def choose_gl() -> None:
 
 def require_known_gl() -> None:
     """Raise a RenderError unless MuJoCo can be imported with the value of `MUJOCO_GL`."""
-    chosen = os.environ.get("MUJOCO_GL", "").lower().strip()
-    if chosen not in (*_LIBRARIES, *_OTHER_VALUES):
-        raise _no_library(chosen)
+    _require_in((*_LIBRARIES, *_OTHER_VALUES), os.environ.get("MUJOCO_GL", "").lower().strip())
+
+
+def _require_in(values: tuple[str, ...], chosen: str) -> None:
+    if chosen not in values:
+        raise RenderError(
+            f"MuJoCo cannot render with MUJOCO_GL={chosen}: set it to one of "
+            f"{', '.join(_LIBRARIES)}, or unset it."
+        )
 
 
 def open_context(width: int, height: int) -> Any:
@@ -81,13 +86,6 @@ def open_context(width: int, height: int) -> Any:
             f"{', '.join(_LIBRARIES)}, or unset it."
         ) from error
     return context
-
-
-def _no_library(chosen: str) -> RenderError:
-    return RenderError(
-        f"MuJoCo cannot render with MUJOCO_GL={chosen}: set it to one of {', '.join(_LIBRARIES)}, "
-        "or unset it."
-    )
 
 
 @cache

@@ -36,7 +36,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 from shapechanger.contract.env_ref import RETURN, Measure
 from shapechanger.envs.catalogue import MODEL_FILES, OWN_ROBOT
 from shapechanger.envs.checks import check_action
-from shapechanger.envs.layouts import contact_features, position_features, velocity_features
+from shapechanger.envs.layouts import body_features, position_features, velocity_features
 from shapechanger.envs.own_tasks import (
     RobotState,
     as_task,
@@ -52,6 +52,7 @@ from shapechanger.morphology.families import BodyLike, Family
 from shapechanger.morphology.pose import (
     StartRules,
     floor_height,
+    posed,
     robot_bodies,
     standing_height,
     start_pose,
@@ -306,7 +307,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         height, trunk = standing_height(model, pose), travelling_body(model)
         if height is None and trunk is not None and trunk_lift(model) is None:
             # For example a base on wheels that slides in a plane: it keeps its height.
-            height = float(_posed(model, pose).xpos[trunk, 2])
+            height = float(posed(model, pose).xpos[trunk, 2])
         return pose, None if height is None else height - floor_height(model, pose)
 
     def _follow_body(self) -> None:
@@ -316,13 +317,14 @@ class OwnRobotEnv(Reshapable, EzPickle):
         self._trunk = travelling or int(model.body_rootid[np.argmax(robot_bodies(model))])
         super()._follow_body()
         self._floor = floor_height(model, self.init_qpos)
-        at_start = _posed(model, self.init_qpos)
+        at_start = posed(model, self.init_qpos)
         self._up_axis = at_start.xmat[self._trunk].reshape(3, 3)[2].copy()
         low, high = self.action_layout.low, self.action_layout.high
         self._middle, self._half_range = 0.5 * (low + high), 0.5 * (high - low)
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
-        features = position_features(model) + velocity_features(model) + contact_features(model)
+        features = [*position_features(model), *velocity_features(model)]
+        features += body_features(model, "contact")
         names = [feature.name for feature in features]
         places = sorted({*range(model.nq + model.nv)} - _place_on_floor(model))
         if self._observed is not None:
@@ -407,13 +409,6 @@ class OwnRobotEnv(Reshapable, EzPickle):
     def family_name(self) -> str:
         """The file and the rig, which must be the same to interpolate between two bodies."""
         return self._file.key
-
-
-def _posed(model: mujoco.MjModel, pose: _Floats) -> mujoco.MjData:
-    data = mujoco.MjData(model)
-    data.qpos[:] = pose
-    mujoco.mj_kinematics(model, data)
-    return data
 
 
 def _place_on_floor(model: mujoco.MjModel) -> set[int]:

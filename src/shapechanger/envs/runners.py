@@ -28,11 +28,9 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 
 from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN, Measure
 from shapechanger.envs.layouts import (
-    contact_features,
+    body_features,
     drive_features,
-    inertia_features,
     position_features,
-    twist_features,
     velocity_features,
 )
 from shapechanger.envs.odrl import published
@@ -535,16 +533,13 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     place_size = 2
 
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
-        blocks = {
-            "cinert": inertia_features,
-            "cvel": twist_features,
-            "qfrc_actuator": drive_features,
-            "cfrc_ext": contact_features,
-        }
+        blocks = {"cinert": "inertia", "cvel": "twist", "qfrc_actuator": "", "cfrc_ext": "contact"}
         seen = {name: arguments.get(f"include_{name}_in_observation", True) for name in blocks}
-        self._blocks = [features for name, features in blocks.items() if seen[name]]
+        self._blocks = [block for name, block in blocks.items() if seen[name]]
         super()._begin(body, arguments)
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
         features = super()._observation_features(model)
-        return features + [feature for block in self._blocks for feature in block(model)]
+        for block in self._blocks:
+            features += body_features(model, block) if block else drive_features(model)
+        return features

@@ -42,8 +42,7 @@ class _Scene(NamedTuple):
     name: str
     env: EnvRef
     act: Act
-    body_map: BodyMap | None
-    drives: bool = False  # Whether a vehicle drives: its env renders its camera; film from outside.
+    body_map: BodyMap | None = None
 
 
 def film_study(
@@ -56,24 +55,22 @@ def film_study(
 ) -> list[FilmStrip]:
     """Play each arm's median seed for ten seconds, from the same start.
 
-    Args:
-        study: The study.
-        folder: Folder of the study.
-        film: File of a film of all scenes side by side; None for no film.
-        source_policy: File of the source policy; None for the policy of the study.
-        shadows: Whether frames have shadows.
+    If `film` is a file, a film of all scenes side by side is written to it. The source policy is
+    the study's unless a file is given.
     """
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []
     fps = 0.0
-    scenes = _scenes(study, folder, source_policy)
+    # A vehicle's env renders its camera, so it is filmed from outside.
+    drives = "demonstrations" in study.plan.settings.takes
+    scenes = _scenes(study, folder, source_policy, drives)
     # Bodies of one family are drawn at the same scale.
     distances: dict[str, float] = {}
     for env in (scene.env for scene in scenes if scene.env.id in CATALOGUE):
         family = CATALOGUE[env.id].family
         distances[family] = max(view_distance(env), distances.get(family, 0.0))
     for scene in scenes:
-        frames, fps, measured = _play(scene, distances, shadows)
+        frames, fps, measured = _play(scene, distances, shadows, drives)
         if not frames:
             return []
         gap = np.full((_HEIGHT, _GAP, 3), 255, np.uint8)
@@ -101,11 +98,9 @@ def view_distance(env_ref: EnvRef) -> float:
         return float(inner.mujoco_renderer.default_cam_config["distance"])
 
 
-def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
-    plan = study.plan
+def _scenes(study: Study, folder: Path, given: Path | None, drives: bool) -> list[_Scene]:
+    plan, scenes = study.plan, list[_Scene]()
     learner = learner_of(plan.learner, plan.settings)
-    drives = "demonstrations" in plan.settings.takes
-    scenes: list[_Scene] = []
 
     def policy(run: Run) -> Act:
         file = given if given is not None and run.kind == SOURCE else run.policy_file(folder)
@@ -114,17 +109,15 @@ def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
     trained = bool(study.of(SOURCE))
     if has_source := trained or given is not None:
         middle = Run(SOURCE, median_index(study, SOURCE) if trained else 0)
-        scenes.append(
-            _Scene("source, in the source", plan.task.source, policy(middle), None, drives)
-        )
+        scenes.append(_Scene("source, in the source", plan.task.source, policy(middle)))
     for arm in sorted(plan.arms, key=lambda arm: arm == "scratch"):  # The baseline comes last.
         run = Run(arm, median_index(study, arm))
         target = plan.target_of(run)
         if plan.trains(arm):
-            scenes.append(_Scene(arm, target, policy(run), None, drives))
+            scenes.append(_Scene(arm, target, policy(run)))
         elif has_source:
             source = policy(Run(SOURCE, run.index))
-            scenes.append(_Scene(arm, target, source, None if drives else plan.body_map, drives))
+            scenes.append(_Scene(arm, target, source, None if drives else plan.body_map))
     return scenes
 
 
@@ -137,12 +130,12 @@ def median_index(study: Study, kind: str) -> int:
 
 
 def _play(
-    scene: _Scene, distances: Mapping[str, float], shadows: bool
+    scene: _Scene, distances: Mapping[str, float], shadows: bool, drives: bool
 ) -> tuple[list[NDArray[np.uint8]], float, str]:
     """Return frames, their rate, and the default measure over them."""
     size: dict[str, Any] = {}
     entry = CATALOGUE.get(scene.env.id)
-    if not scene.drives:
+    if not drives:
         finer = {"width": _FINER * _WIDTH, "height": _FINER * _HEIGHT}
         size = {"render_mode": "rgb_array", **finer, **({"shadows": shadows} if entry else {})}
     with closing(scene.env.make(**size)) as env:
@@ -151,12 +144,12 @@ def _play(
             inner.mujoco_renderer.default_cam_config["distance"] = distances[entry.family]
 
         def frame() -> NDArray[Any]:
-            if scene.drives:
+            if drives:
                 return inner.world.outside(_WIDTH, _HEIGHT, _REACH_M, azimuth_rad=_FOLLOWING_RAD)
             parts = np.asarray(env.render()).reshape(_HEIGHT, _FINER, _WIDTH, _FINER, 3)
             return parts.mean(axis=(1, 3)).astype(np.uint8)
 
-        if scene.drives and not hasattr(inner, "world"):
+        if drives and not hasattr(inner, "world"):
             return [], 0.0, ""  # A real robot cannot be filmed.
         hold_out(env)
         fps = float(env.metadata["render_fps"])

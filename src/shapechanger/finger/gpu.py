@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 from typing_extensions import override
 
-from shapechanger.envs.warp.bodies import DeviceBody, device_body
 from shapechanger.envs.warp.kernels import uniforms
 from shapechanger.envs.warp.reader import BodyReader, MakeWorlds, register_reader
 from shapechanger.envs.warp.tasks import length
-from shapechanger.envs.warp.worlds import Infos, Worlds
+from shapechanger.envs.warp.worlds import DeviceBody, Infos, Worlds, device_body
 from shapechanger.errors import VectorEnvError
 from shapechanger.finger.anatomy import DIP_BAND, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.env import SMOOTHNESS, FingerLike, as_finger

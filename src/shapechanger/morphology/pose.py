@@ -177,7 +177,7 @@ def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
     The pose is returned unchanged if no joint raises the trunk or no floor is below it.
     """
     rules, pose = StartRules(model), pose.copy()
-    if rules.lift is not None and (gap := rules.floor_gap(_posed(model, pose))) < _FAR_M:
+    if rules.lift is not None and (gap := rules.floor_gap(posed(model, pose))) < _FAR_M:
         rules.lift.raise_by(pose, -gap)
     return pose
 
@@ -194,20 +194,21 @@ def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float 
     if pose is None:
         pose = model.qpos0.copy()
         pose[rules.limited_places] = 0.5 * (rules.lowest + rules.highest)
-    gap = rules.floor_gap(_posed(model, pose))
+    gap = rules.floor_gap(posed(model, pose))
     return None if gap >= _FAR_M else rules.lift.height(pose) - gap
 
 
 def floor_height(model: mujoco.MjModel, pose: _Array) -> float:
     """Return the height in the world of the floor nearest to a robot in a pose, m; 0 for none."""
-    data, ends, nearest = _posed(model, pose), np.zeros(6), (_FAR_M, 0.0)
+    data, ends, nearest = posed(model, pose), np.zeros(6), (_FAR_M, 0.0)
     for floor, geom in StartRules(model).floor_pairs:
         gap = mujoco.mj_geomDistance(model, data, floor, geom, _FAR_M, ends)
         nearest = min(nearest, (gap, float(ends[2])))
     return nearest[1]
 
 
-def _posed(model: mujoco.MjModel, pose: _Array) -> mujoco.MjData:
+def posed(model: mujoco.MjModel, pose: _Array) -> mujoco.MjData:
+    """Return data of a model in a pose (nq,), up to date with `mj_kinematics`."""
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)

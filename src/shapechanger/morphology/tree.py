@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.morphology.pose import GROUND, robot_bodies, travelling_body
+from shapechanger.morphology.pose import GROUND, posed, robot_bodies, travelling_body
 from shapechanger.morphology.spec.references import OF_JOINTS
 
 _Array = NDArray[np.float64]
@@ -81,9 +81,7 @@ class Tree(msgspec.Struct, frozen=True):
 
 def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
     """Describe the kinematic tree of a body in its start pose (nq,)."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = pose
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, pose)
     mujoco.mj_comPos(model, data)  # Masses of subtrees.
     mujoco.mj_tendon(model, data)
     mujoco.mj_transmission(model, data)

@@ -13,8 +13,8 @@ import torch
 
 import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
-from shapechanger.envs.warp.bodies import device_body, differing_arrays
 from shapechanger.envs.warp.devices import mjw, wp
+from shapechanger.envs.warp.worlds import device_body, differing_arrays
 from shapechanger.errors import BadAction, UnknownName, VectorEnvError
 from shapechanger.morphology import (
     AddSegment,

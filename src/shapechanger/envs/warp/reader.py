@@ -13,10 +13,9 @@ import mujoco
 
 from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS
 from shapechanger.envs.checks import describe_body
-from shapechanger.envs.warp.bodies import DeviceBody, device_body, differing_arrays
 from shapechanger.envs.warp.kernels import follow_mujoco
 from shapechanger.envs.warp.tasks import TASKS, DeviceTask
-from shapechanger.envs.warp.worlds import Worlds
+from shapechanger.envs.warp.worlds import DeviceBody, Worlds, device_body, differing_arrays
 from shapechanger.errors import SpaceMismatch, VectorEnvError
 from shapechanger.morphology import Body
 

@@ -32,9 +32,8 @@ from shapechanger.envs.runners import (
     SwimmerEnv,
     Walker2dEnv,
 )
-from shapechanger.envs.warp.bodies import geom_type
 from shapechanger.envs.warp.kernels import uniforms
-from shapechanger.envs.warp.worlds import Infos, Worlds
+from shapechanger.envs.warp.worlds import Infos, Worlds, geom_type
 from shapechanger.errors import VectorEnvError
 from shapechanger.morphology.pose import StartRules
 
