@@ -108,17 +108,9 @@ def action_layout(model: mujoco.MjModel) -> Layout:
         kind = _J(model.jnt_type[model.actuator_trnid[a, 0]]) if drives_joint else None
         target = _servo_unit(model, a, kind)
         unit = _FORCE_UNIT.get(kind, "") if kind is not None and gear > 0.0 and not target else ""
-        features.append(
-            Feature(
-                f"{name}/{'target' if target else 'motor'}",
-                target or "1",
-                float(low),
-                float(high),
-                Element("actuator", name),
-                gain=gear if unit else 1.0,
-                gain_unit=unit,
-            )
-        )
+        about = f"{name}/{'target' if target else 'motor'}", target or "1", float(low), float(high)
+        gain = gear if unit else 1.0
+        features.append(Feature(*about, Element("actuator", name), gain=gain, gain_unit=unit))
     return Layout(tuple(features))
 
 

@@ -221,10 +221,8 @@ class OwnRobotEnv(Reshapable, EzPickle):
         **arguments: Arguments of Gymnasium's `MujocoEnv` and of `Reshapable`.
 
     Attributes:
-        task: The task.
-        task_name: Name of the task.
+        task: The task; `task_name` is its name.
         measures: Metrics of a policy, the default first.
-        reset_noise_scale: The argument of this name.
     """
 
     # `gym.make` reads the modes from the class; the rate of the frames depends on the model.

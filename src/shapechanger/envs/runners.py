@@ -75,13 +75,7 @@ class Runner(Reshapable):
     above the floor. The standing height is the height in the start pose, because these legs are
     folded if joints are in the middle of their ranges.
 
-    Args:
-        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON; None
-            for the family's first.
-        **arguments: All arguments of Gymnasium's env and of `Reshapable`.
-
     Attributes:
-        measures: Metrics of a policy.
         root: Types of the joints that determine the trunk's position.
         place_size: How many numbers of the trunk's position the observation omits by default.
         velocity_limit: Limit to which observed velocities are clipped, m/s and rad/s.
@@ -121,13 +115,7 @@ class HealthyRunner(Runner):
     """Runner that is healthy while its trunk is neither too low nor too high.
 
     For the unedited body the heights are Gymnasium's; for any other they scale with its standing
-    height.
-
-    Args:
-        body: As in `Runner`.
-        healthy_z_range: Heights of the trunk between which the body is healthy, m, as positions of
-            the joint that raises it; None derives them from the body.
-        **arguments: All other arguments of Gymnasium's env.
+    height. They are positions of the joint that raises the trunk, m.
     """
 
     _healthy_z_range: tuple[float, float]
@@ -296,8 +284,7 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        healthy_z_range: Heights of the torso between which the body is healthy, m; None
-            derives them from the body.
+        healthy_z_range: Least and largest healthy height of the torso, m; None follows the body.
         **arguments: All other arguments of `Hopper-v5` and of `Reshapable`.
     """
 
@@ -364,8 +351,7 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        healthy_z_range: Heights of the torso between which the body is healthy, m; None
-            derives them from the body.
+        healthy_z_range: Least and largest healthy height of the torso, m; None follows the body.
         **arguments: All other arguments of `Walker2d-v5` and of `Reshapable`.
     """
 
@@ -523,8 +509,7 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        healthy_z_range: Heights of the torso between which the body is healthy, m; None
-            derives them from the body.
+        healthy_z_range: Least and largest healthy height of the torso, m; None follows the body.
         **arguments: All other arguments of `Humanoid-v5` and of `Reshapable`.
     """
 

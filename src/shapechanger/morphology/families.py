@@ -330,10 +330,10 @@ def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, .
     )
 
 
-def strength_axes(trunk: str, actuators: str = "*") -> tuple[Axis, ...]:
+def strength_axes(trunk: str) -> tuple[Axis, ...]:
     """Return axes for the mass of the trunk, a body, the strength of motors and all friction."""
     return (
         Axis(f"mass of {trunk}", partial(Mass, trunk), 0.7, 1.5, 0.5, 2.5),
-        Axis("strength of the motors", partial(Gear, actuators), 0.8, 1.25, 0.6, 1.6),
+        Axis("strength of the motors", partial(Gear, "*"), 0.8, 1.25, 0.6, 1.6),
         Axis("friction", partial(Friction, "*"), 0.7, 1.4, 0.45, 2.0),
     )

@@ -198,9 +198,8 @@ class TunedStep(Reshapable):
     diverged is in the `warnings` of its binding.
 
     Attributes:
-        replaced: Methods and properties that `_advance` replaces.
-        tuned: The class that `_advance` was written for.
-        binding: Class of its bindings.
+        replaced: Methods and properties that `_advance` replaces; `tuned` is the class that it was
+            written for.
         patience: Steps with a body, summed over all envs that have it, before a fast model is
             searched. For an ant, the search takes 20 ms and saves 0.05 ms a step, so it would not
             pay off for a body that soon changes. Results do not depend on the time of the search.

@@ -41,10 +41,6 @@ class EnvThreads:
     threads. The other threads start with the first work, and again in a forked process. A
     SimpleQueue stays consistent even when a signal interrupts the caller; a pair of locks does not.
 
-    Args:
-        threads: How many threads, including the caller's.
-        num_envs: How many envs there are.
-
     Attributes:
         lost: Whether an interruption left threads running; do not touch their envs.
     """
@@ -65,15 +61,9 @@ class EnvThreads:
     ) -> None:
         """Do `work` for some envs, and return when it has ended for all of them.
 
-        Args:
-            work: Function of the number of an env.
-            numbers: Numbers of envs whose own thread must do the work.
-            anywhere: Numbers of envs for which the first free thread does the work.
-            alone: Whether the caller's thread does the work for all envs.
-
-        Raises:
-            BaseException: The exception of the first env that failed, with a note that names the
-                env; the work is done for all others.
+        Each env in `numbers` is done by its own thread, and each env in `anywhere` by the first
+        free thread; with `alone`, the caller's thread does all. The exception of the first env that
+        failed is raised after the work for all others, with a note that names the env.
         """
         chosen, queue = list(numbers), deque(anywhere)
         parts = [chosen] if alone else [[i for i in chosen if i in part] for part in self._parts]

@@ -53,25 +53,16 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
     A step waits for the device once, to check that actions are finite, and copies nothing to it.
 
-    Args:
-        reader: Compiles bodies.
-        bodies: The body of each world, None for the reader's default; or, with `redraws`, the pool
-            of bodies.
-        num_envs: How many worlds there are.
-        device: Name of the device.
-        redraws: Whether `bodies` is a pool, of which each start of an episode draws one.
-        limits: `nconmax` and `njmax` of `make_vec`.
-        task_infos: As in `make_vec`.
+    `shapechanger.make_vec` makes it. With `redraws`, `bodies` is a pool, of which each start of an
+    episode draws one; otherwise it has the body of each world, None for the reader's default.
 
     Attributes:
-        device: Name of the device.
         batches: The worlds, by the shapes of their arrays.
         made_from: The spec of the CPU env, or None.
         max_episode_steps: Steps after which an episode is truncated; None for never.
         episode_steps: Steps of each world's episode so far, shape (n,); it may be written.
-        observation_layout: Name, unit and range of each number of an observation of the first
-            batch.
-        action_layout: Name, unit and range of each number of an action of the first batch.
+        observation_layout: Name, unit and range of each number of the first batch's observations;
+            `action_layout` describes its actions.
     """
 
     observation_space: gym.Space[Any]

@@ -57,9 +57,10 @@ class DeviceTask(Worlds):
     """
 
     normal_velocities: ClassVar[bool] = False
-    place_size: ClassVar[int] = 0
+    place_size = 0
 
     def __init__(self, env: Any, model: mujoco.MjModel, *args: Any, **kwargs: Any) -> None:
+        self.place_size: int = getattr(env, "place_size", self.place_size)
         super().__init__(env, model, *args, **kwargs)
         rules = StartRules(model)
         self._limited = torch.as_tensor(rules.limited_places, device=self.device)
@@ -258,7 +259,6 @@ class DeviceDoublePendulum(DeviceTask):
 class DeviceRunner(DeviceTask):
     """Runners whose episodes never terminate."""
 
-    place_size = 1
     # Index of the trunk's height in `qpos`.
     height_at: ClassVar[int] = 1
 
@@ -299,12 +299,6 @@ class DeviceRunner(DeviceTask):
         return rewards, ~healthy & ends, infos
 
 
-class DeviceSwimmer(DeviceRunner):
-    """Swimmers, which are rewarded for their place in a horizontal plane."""
-
-    place_size = 2
-
-
 class DeviceCheetah(DeviceRunner):
     """Half cheetahs."""
 
@@ -342,7 +336,7 @@ _BLOCKS: Final = {"cinert": 1, "cvel": 1, "qfrc_actuator": 6, "cfrc_ext": 1}
 class DeviceHumanoid(DeviceRunner):
     """Humanoids, rewarded for the speed of the centre of mass and healthy within heights."""
 
-    place_size = height_at = 2
+    height_at = 2
     contact_forces = True
     start_forces = True
 
@@ -378,7 +372,7 @@ TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
     HalfCheetahEnv: DeviceCheetah,
     HopperEnv: DeviceHopper,
     Walker2dEnv: DeviceWalker,
-    SwimmerEnv: DeviceSwimmer,
+    SwimmerEnv: DeviceRunner,
     HumanoidEnv: DeviceHumanoid,
 }
 """Batched functions of bodies, keyed by the class of their CPU env."""

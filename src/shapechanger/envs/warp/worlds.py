@@ -140,7 +140,6 @@ class Worlds(ABC):
         numbers: The number of each world in the vector env.
         bodies: The bodies that the worlds can have, keyed by their edits.
         each: The edits of each world's body.
-        device: Name of the device.
         redraws: Whether each start of an episode draws one of the bodies.
         limits: How many contacts (`nconmax`) and rows of constraints (`njmax`) a world has memory
             for; a missing number is the largest possible one.
