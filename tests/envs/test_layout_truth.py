@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from shapechanger.envs import CATALOGUE
-from shapechanger.layout import Feature
 from shapechanger.morphology import AddLimb, Lock, Split, to_json
 from shapechanger.morphology.pose import trunk_lift
 from tests.morphology.scenes import ASSETS
@@ -24,11 +23,6 @@ _JOINTS = {
     for block in ("cinert", "cvel", "qfrc_actuator", "cfrc_ext")
 }
 _PLANAR = ("HalfCheetah", "Hopper", "Walker2d", "Swimmer")
-# Root joints, which have no limits.
-_ROOTS = {
-    *("root", "rootx", "rootz", "rooty"),
-    *("slider1", "slider2", "free_body_rot"),
-}
 _OTHER_BODY = (
     AddLimb("aux_1", "_5", 0.8, 0.7),
     Lock("ankle_3"),
@@ -256,37 +250,6 @@ def test_a_motor_drives_its_own_joint(env: Any) -> None:
         expected = np.zeros(env.model.nv)
         expected[env.model.joint(joint).dofadr] = feature.gain * control
         np.testing.assert_allclose(env.data.qfrc_actuator, expected, rtol=1e-12)
-
-
-def test_ranges_are_those_of_the_model(env: Any) -> None:
-    """Features have the limits of their joints, or none."""
-    limits = {
-        env.model.joint(j).name: env.model.jnt_range[j]
-        for j in range(env.model.njnt)
-        if env.model.jnt_limited[j]
-    }
-    names = {env.model.joint(j).name for j in range(env.model.njnt)}
-    # The ant's root joint has a generated name.
-    assert names - limits.keys() <= _ROOTS | {env.model.joint(0).name}
-    clipped = env.family.name in ("Hopper", "Walker2d")
-
-    def expected(feature: Feature) -> tuple[float, float]:
-        element, _, quantity = feature.name.partition("/")
-        if quantity in ("angle", "position"):
-            return tuple(limits.get(element, (-math.inf, math.inf)))
-        if quantity in ("qw", "qx", "qy", "qz"):
-            return -1.0, 1.0
-        if quantity.startswith("contact/"):
-            return -1.0, 1.0
-        if quantity == "velocity" and clipped:
-            return -10.0, 10.0
-        return -math.inf, math.inf
-
-    for feature in env.observation_layout:
-        assert (feature.low, feature.high) == expected(feature)
-        assert (feature.gain, feature.gain_unit) == (1.0, "")
-    for feature, bounds in zip(env.action_layout, env.model.actuator_ctrlrange, strict=True):
-        assert (feature.low, feature.high) == tuple(bounds)
 
 
 def test_features_name_elements_of_the_model(env: Any) -> None:

@@ -22,6 +22,7 @@ from shapechanger.envs.runners import HALF_CHEETAH, HOPPER, WALKER2D
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.certificate import fingerprint
 from shapechanger.morphology.families import Family
+from tests.morphology.models import posed
 
 _ASSETS = Path(gymnasium_mujoco.__file__).parent / "assets"
 _ROBOTS: dict[str, tuple[Family, str]] = {
@@ -45,15 +46,9 @@ def _source(name: str) -> mujoco.MjModel:
     return _model("-".join(name.split("-")[:2]))
 
 
-def _posed(model: mujoco.MjModel) -> mujoco.MjData:
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    return data
-
-
 def _ends(model: mujoco.MjModel, geom: str) -> list[list[float]]:
     """Return both ends of a capsule's axis in the world, sorted."""
-    data = _posed(model)
+    data = posed(model)
     half = data.geom(geom).xmat.reshape(3, 3)[:, 2] * model.geom(geom).size[1]
     return sorted([(data.geom(geom).xpos + side * half).tolist() for side in (1.0, -1.0)])
 
@@ -139,13 +134,8 @@ def _degrees(lower: float, upper: float) -> tuple[float, float]:
 # Ranges of joints of the easy, medium and hard level, rad.
 _RANGES: dict[str, dict[str, list[tuple[float, float]]]] = {
     "odrl-ant-kinematic-anklejnt": {
-        joint: [_degrees(30, x) if ahead else _degrees(-x, -30) for x in (62, 50, 38)]
-        for joint, ahead in (
-            ("ankle_1", True),
-            ("ankle_2", False),
-            ("ankle_3", False),
-            ("ankle_4", True),
-        )
+        f"ankle_{leg}": [_degrees(30, x) if ahead else _degrees(-x, -30) for x in (62, 50, 38)]
+        for leg, ahead in ((1, True), (2, False), (3, False), (4, True))
     },
     "odrl-ant-kinematic-hipjnt": {
         f"hip_{leg}": [_degrees(-x, x) for x in (24, 15, 6)] for leg in (1, 2, 3, 4)

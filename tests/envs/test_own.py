@@ -275,13 +275,6 @@ def test_fixed_robots_have_tasks_too(tmp_path: Path) -> None:
         shapechanger.from_mjcf(path, rig=AddMotor("*", 2.0))
 
 
-def test_a_robot_that_would_fall_through_is_refused(dog: Path) -> None:
-    """The task needs a floor that the robot's geoms can touch."""
-    dog.write_text(DOG.replace('name="floor"', 'name="floor" contype="2" conaffinity="2"'))
-    with pytest.raises(TaskError, match="would fall through the world"):
-        shapechanger.from_mjcf(dog)
-
-
 def test_velocity_servos_have_a_unit(dog: Path) -> None:
     """A velocity servo's control is a velocity; other actuators with a bias are plain motors."""
     dog.write_text(
@@ -329,16 +322,27 @@ def test_observed_numbers_must_exist(dog: Path) -> None:
         shapechanger.from_mjcf(dog, Blind)
 
 
-def test_models_that_do_not_compile_are_refused(dog: Path) -> None:
-    dog.write_text(
-        DOG.replace('name="front" pos', 'name="paw" pos').replace(' mass="3"', ' mass="0"')
-    )
-    with pytest.raises(BrokenModel, match=r"compile dog\.xml: mass and inertia of moving bodies"):
-        shapechanger.from_mjcf(dog)
+_MASSLESS = DOG.replace('name="front" pos', 'name="paw" pos').replace(' mass="3"', ' mass="0"')
 
 
-def test_models_without_joints_are_refused(dog: Path) -> None:
-    """The message does not suggest to add motors, which would not help."""
-    dog.write_text('<mujoco><worldbody><body><geom size=".1"/></body></worldbody></mujoco>')
-    with pytest.raises(MorphologyError, match=r"dog\.xml has no joints, so it cannot move"):
+@pytest.mark.parametrize(
+    ("text", "error", "sentence"),
+    [
+        (_MASSLESS, BrokenModel, r"compile dog\.xml: mass and inertia of moving bodies"),
+        (
+            '<mujoco><worldbody><body><geom size=".1"/></body></worldbody></mujoco>',
+            *(MorphologyError, r"dog\.xml has no joints, so it cannot move"),
+        ),
+        # A floor that the geoms of the robot cannot touch.
+        (
+            DOG.replace('name="floor"', 'name="floor" contype="2" conaffinity="2"'),
+            *(TaskError, "would fall through the world"),
+        ),
+    ],
+)
+def test_models_that_cannot_walk_are_refused(
+    dog: Path, text: str, error: type[Exception], sentence: str
+) -> None:
+    dog.write_text(text)
+    with pytest.raises(error, match=sentence):
         shapechanger.from_mjcf(dog)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import pickle
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
@@ -245,27 +246,16 @@ def test_a_picture_shows_the_whole_body(env_id: str) -> None:
     assert max(np.ptp(rows) / 90, np.ptp(columns) / 120) > 0.25
 
 
-def _torso_pixels(env_id: str, reach: float) -> int:
-    """Return the number of pixels of the torso, which is the same ball on each ant."""
-    with gym.make(env_id) as made:
-        env: Any = made.unwrapped
-        _without_shadows(env)
-        _hide(env, but="torso_geom")
-        with_torso = env.picture(width=320, height=240, reach=reach)
-        _hide(env)
-        without = env.picture(width=320, height=240, reach=reach)
-    return int(_differs(with_torso, without).sum())
-
-
-def test_bodies_are_drawn_to_one_scale() -> None:
-    """With equal reach, equal parts have equal size."""
-    with gym.make("shapechanger/Ant-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
-        small, large = one.unwrapped.reach, other.unwrapped.reach
-    assert large > 1.4 * small
-    reference = _torso_pixels("shapechanger/Ant-v1", large)
-    # The ant's torso is slightly nearer to the camera's centre than the big ant's.
-    assert _torso_pixels("shapechanger/BigAnt-v1", large) == pytest.approx(reference, rel=0.1)
-    assert _torso_pixels("shapechanger/Ant-v1", small) > 1.4 * reference
+def test_a_reach_sets_the_scale(ant: Any) -> None:
+    """At twice the reach, the body covers about a quarter of the pixels."""
+    env, shown = ant.unwrapped, []
+    _without_shadows(env)
+    reaches = 1.2 * env.reach, 2.4 * env.reach
+    pictures = [env.picture(width=320, height=240, reach=reach) for reach in reaches]
+    _hide(env)
+    for reach, picture in zip(reaches, pictures, strict=True):
+        shown.append(_differs(env.picture(width=320, height=240, reach=reach), picture).sum())
+    assert shown[1] == pytest.approx(shown[0] / 4.0, rel=0.15)
 
 
 def test_a_picture_shows_the_start_and_changes_nothing(ant: Any) -> None:
@@ -401,3 +391,43 @@ def test_only_textures_differ_without_rendering() -> None:
         value = getattr(drawn, name)
         if isinstance(value, np.ndarray) and name not in _PIXELS and name[0] != "_":
             np.testing.assert_array_equal(getattr(plain, name), value, err_msg=name)
+
+
+# Shadows.
+
+
+@pytest.mark.parametrize(
+    ("size", "arguments", "shadows"),
+    [
+        (256, {}, False),
+        (257, {}, True),
+        (64, {"shadows": True}, True),
+    ],
+)
+def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shadows: bool) -> None:
+    """Frames of up to 256 pixels have no shadows by default; copies of the env render the same."""
+    more = {"render_mode": "rgb_array", "width": size, "height": size, **arguments}
+    with gym.make("shapechanger/Ant-v1", **more) as env:
+        quality = env.unwrapped.model.vis.quality
+        before = quality.offsamples, quality.shadowsize
+        env.reset(seed=0)
+        frame = env.render()
+        assert (quality.offsamples, quality.shadowsize) == before
+        viewer = env.unwrapped.mujoco_renderer.viewer
+        assert bool(viewer.scn.flags[mujoco.mjtRndFlag.mjRND_SHADOW]) is shadows
+        assert bool(viewer.con.offSamples) is shadows
+        copies = [pickle.loads(pickle.dumps(env)), gym.make(env.spec)]
+    for again in copies:
+        again.reset(seed=0)
+        np.testing.assert_array_equal(again.render(), frame)
+        again.close()
+
+
+def test_a_frame_shows_edited_colours() -> None:
+    """Colours edited in the public model are rendered."""
+    size = {"width": 64, "height": 64}
+    with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **size) as env:
+        env.reset(seed=0)
+        before = env.render()
+        env.unwrapped.model.mat_rgba[:] = env.unwrapped.model.geom_rgba[:] = (1.0, 0.0, 0.0, 1.0)
+        assert (env.render() != before).any()

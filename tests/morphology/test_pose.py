@@ -18,6 +18,7 @@ from shapechanger.morphology.pose import (
     start_pose,
     trunk_lift,
 )
+from shapechanger.morphology.pose import posed as pose_of
 from tests.morphology.models import ant, built, posed, spec_of
 
 _BALL = """
@@ -34,13 +35,6 @@ _PLANE = '<geom type="plane" size="1 1 1" pos="0 0 .3"/>'
 
 def _ball(floor: str, ball: str = "") -> mujoco.MjModel:
     return built(spec_of(_BALL.format(floor=floor, ball=ball)))
-
-
-def _at(model: mujoco.MjModel, pose: np.ndarray) -> mujoco.MjData:
-    data = mujoco.MjData(model)
-    data.qpos[:] = pose
-    mujoco.mj_kinematics(model, data)
-    return data
 
 
 @pytest.mark.parametrize(
@@ -100,7 +94,7 @@ def test_no_foot_starts_in_the_floor(body: str, factor: float) -> None:
     """The trunk is raised as far as needed and never lowered."""
     model = built(ant(), *ANT.bodies[body], Stretch("shank_*", factor))
     pose = start_pose(model)
-    data = _at(model, pose)
+    data = pose_of(model, pose)
     gap = StartRules(model).floor_gap(data)
     assert gap >= -1e-6
     assert pose[2] == model.qpos0[2] or gap == pytest.approx(0.0, abs=1e-6)
@@ -145,7 +139,7 @@ def test_a_slide_raises_a_trunk(axis: str, ref: float, turn: str, lift: Lift) ->
     assert found == pytest.approx(lift, abs=1e-12)
     pose = model.qpos0.copy()
     found.raise_by(pose, 0.5)
-    data = _at(model, pose)
+    data = pose_of(model, pose)
     assert data.body("torso").xpos[2] == pytest.approx(found.height(pose)) == pytest.approx(1.5)
     assert found.number_at(1.5) == pytest.approx(pose[found.place])
 
@@ -181,7 +175,7 @@ def test_a_standing_pose_touches_the_floor() -> None:
         pose = model.qpos0.copy()
         pose[2] = height
         standing = standing_pose(model, pose)
-        data = _at(model, standing)
+        data = pose_of(model, standing)
         assert StartRules(model).floor_gap(data) == pytest.approx(0.0, abs=1e-9)
         np.testing.assert_array_equal(standing[3:], pose[3:])
         assert pose[2] == height

@@ -224,6 +224,9 @@ _SCENE = """
 """
 _MOVED_BY_JOINT = '<actuator><motor joint="arm" ctrlrange="-1 1"/></actuator>'
 _ROBOT = ["base", "arm"]
+# A flex, whose equality couples no bodies.
+_CLOTH = """<worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" dim="2"
+  radius=".01" pos="0 3 1"><edge equality="true"/></flexcomp></worldbody>"""
 
 
 def _model(more: str) -> mujoco.MjModel:
@@ -247,6 +250,7 @@ def _robot(model: mujoco.MjModel) -> list[str]:
         '<actuator><motor cranksite="crank" slidersite="tip" cranklength=".1"/></actuator>',
         '<actuator><adhesion body="arm" ctrlrange="0 1"/></actuator>',
         '<actuator><orientation site="tip" refsite="crank" kp="1"/></actuator>',
+        _CLOTH + _MOVED_BY_JOINT,
     ],
 )
 def test_the_robot_is_what_actuators_move(more: str) -> None:
@@ -277,14 +281,6 @@ def test_what_an_equality_couples_to_the_robot_is_part_of_it(
     )
     model = _model(f"<tendon>{tendons}</tendon><equality>{coupling}</equality>{_MOVED_BY_JOINT}")
     assert set(_robot(model)) == {*_ROBOT, *also}
-
-
-def test_a_flex_couples_no_bodies() -> None:
-    cloth = (
-        '<worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" dim="2" '
-        'radius=".01" pos="0 3 1"><edge equality="true"/></flexcomp></worldbody>'
-    )
-    assert _robot(_model(cloth + _MOVED_BY_JOINT)) == _ROBOT
 
 
 def test_without_actuators_everything_is_the_robot() -> None:
