@@ -87,7 +87,7 @@ def _sensed(env: Any, pose: np.ndarray, velocity: np.ndarray) -> dict[str, float
     return dict(zip(env.observation_layout.names, env._get_obs(), strict=True))
 
 
-def _moved(before: dict[str, float], after: dict[str, float]) -> dict[str, float]:
+def moved(before: dict[str, float], after: dict[str, float]) -> dict[str, float]:
     """Return the features that changed, with their new values."""
     return {name: value for name, value in after.items() if value != before[name]}
 
@@ -131,9 +131,9 @@ def test_a_joint_changes_its_own_position(env: Any) -> None:
         changed = pose.copy()
         place = env.model.jnt_qposadr[j]
         changed[place] += _STEP
-        moved = _moved(before, _sensed(env, changed, velocity))
+        changes = moved(before, _sensed(env, changed, velocity))
         own = {f"{env.model.joint(j).name}/{_ONE_NUMBER[kind]}": changed[place]}
-        assert moved == _visible(env, own)
+        assert changes == _visible(env, own)
 
 
 def test_the_trunk_changes_its_own_position(ant: Any) -> None:
@@ -143,8 +143,8 @@ def test_the_trunk_changes_its_own_position(ant: Any) -> None:
     for place, axis in enumerate("xyz"):
         changed = pose.copy()
         changed[place] += _STEP
-        moved = _moved(before, _sensed(ant, changed, velocity))
-        assert moved == _visible(ant, {f"torso/{axis}": changed[place]})
+        changes = moved(before, _sensed(ant, changed, velocity))
+        assert changes == _visible(ant, {f"torso/{axis}": changed[place]})
     assert "torso/z" in before
 
 
@@ -155,14 +155,14 @@ def test_a_rotation_changes_the_quaternion(ant: Any) -> None:
     for axis, name in enumerate(("qx", "qy", "qz")):
         changed = pose.copy()
         mujoco.mju_axisAngle2Quat(changed[3:7], np.eye(3)[axis], 0.3)
-        moved = _moved(before, _sensed(ant, changed, velocity))
-        assert moved == pytest.approx(
+        changes = moved(before, _sensed(ant, changed, velocity))
+        assert changes == pytest.approx(
             {"torso/qw": math.cos(0.15), f"torso/{name}": math.sin(0.15)}, rel=1e-12
         )
     changed[3:7] = [0.5, 0.1, -0.7, 0.5]
-    moved = _moved(before, _sensed(ant, changed, velocity))
-    assert moved.keys() == {"torso/qw", "torso/qx", "torso/qy", "torso/qz"}
-    np.testing.assert_array_equal(list(moved.values()), changed[3:7])
+    changes = moved(before, _sensed(ant, changed, velocity))
+    assert changes.keys() == {"torso/qw", "torso/qx", "torso/qy", "torso/qz"}
+    np.testing.assert_array_equal(list(changes.values()), changed[3:7])
 
 
 def test_a_velocity_changes_its_own_number(env: Any) -> None:
@@ -177,8 +177,8 @@ def test_a_velocity_changes_its_own_number(env: Any) -> None:
         for place, name in enumerate(names, start=first):
             changed = velocity.copy()
             changed[place] += _STEP
-            moved = _moved(before, _sensed(env, pose, changed))
-            assert moved == {name: changed[place]}
+            changes = moved(before, _sensed(env, pose, changed))
+            assert changes == {name: changed[place]}
 
 
 def test_angular_velocities_are_in_the_trunks_frame(ant: Any) -> None:
@@ -213,11 +213,11 @@ def test_a_force_changes_the_contacts_of_its_body(env: Any) -> None:
             observation, *_ = env.step(np.zeros(env.model.nu))
             env.data.body(body).xfrc_applied[:] = 0.0
             sensed = dict(zip(env.observation_layout.names, observation, strict=True))
-            moved = {name: x for name, x in sensed.items() if "/contact/" in name and x != 0.0}
-            assert moved.keys() <= {f"{body}/contact/{q}{axis}" for q in others for axis in "xyz"}
+            changes = {name: x for name, x in sensed.items() if "/contact/" in name and x != 0.0}
+            assert changes.keys() <= {f"{body}/contact/{q}{axis}" for q in others for axis in "xyz"}
             names = [f"{body}/contact/{kind}{axis}" for axis in "xyz"]
             expected = _visible(env, dict(zip(names, applied, strict=True)))
-            assert {name: moved[name] for name in expected} == pytest.approx(expected, rel=1e-12)
+            assert {name: changes[name] for name in expected} == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(("push_n", "seen"), [(50.0, 2.0), (-50.0, -0.5), (0.25, 0.25)])

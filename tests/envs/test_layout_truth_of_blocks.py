@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from shapechanger.transfer.body_map import BodyMap
+from tests.envs.test_layout_truth import moved as _moved
 
 _BLOCKS = {
     "cinert": "/inertia/",
@@ -25,11 +26,6 @@ _BLOCKS = {
 def _sensed(env: Any) -> dict[str, float]:
     """Return the current observation, by feature name."""
     return dict(zip(env.observation_layout.names, env._get_obs(), strict=True))
-
-
-def _moved(before: dict[str, float], after: dict[str, float]) -> dict[str, float]:
-    """Return the features that changed, with their new values."""
-    return {name: value for name, value in after.items() if value != before[name]}
 
 
 @pytest.fixture

@@ -69,17 +69,8 @@ def test_edits_with_amount_0_are_skipped() -> None:
     assert differing(built(leg()), compile_body(leg(), iter(edits))) == []
 
 
-@pytest.mark.parametrize(
-    ("edit", "reason"),
-    [
-        (
-            Density("thigh", to=0.0),
-            "mass and inertia of moving bodies must be larger than mjMINVAL",
-        ),
-        (Mass("shin", to=1e-18), "mass and inertia of moving bodies must be larger than mjMINVAL"),
-    ],
-)
-def test_a_body_that_does_not_compile_is_refused(edit: Edit, reason: str) -> None:
+@pytest.mark.parametrize("edit", [Density("thigh", to=0.0), Mass("shin", to=1e-18)])
+def test_a_body_that_does_not_compile_is_refused(edit: Edit) -> None:
     """The error contains the body as JSON and MuJoCo's reason."""
     with pytest.raises(BrokenModel) as caught:
         built(leg(), edit)
@@ -87,7 +78,7 @@ def test_a_body_that_does_not_compile_is_refused(edit: Edit, reason: str) -> Non
     found = re.fullmatch(r"MuJoCo does not compile the body (\[.*\]): ([^\n]*[^.\n])\.", message)
     assert found
     assert json.loads(found[1])[0]["edit"] == type(edit).__name__.lower()
-    assert found[2].startswith(reason)
+    assert found[2].startswith("mass and inertia of moving bodies must be larger than mjMINVAL")
     assert isinstance(caught.value, MorphologyError)
     assert isinstance(caught.value.__cause__, ValueError | mujoco.FatalError)
 
@@ -100,14 +91,6 @@ def _named(model: str) -> mujoco.MjSpec:
     spec = asset_spec(model)
     name_elements(spec)
     return spec
-
-
-def _before(model: str) -> mujoco.MjModel:
-    return built(_named(model), Mass("*", scale=1.0))
-
-
-def _limbs(spec: mujoco.MjSpec) -> list[str]:
-    return [b.name for b in spec.bodies[1:] if b.parent.parent is not None]
 
 
 @pytest.mark.parametrize("model", _MODELS)
@@ -124,8 +107,8 @@ def test_all_names_are_unique(model: str) -> None:
 @pytest.mark.parametrize("model", _MODELS)
 def test_every_limb_can_be_removed_copied_cut_split_and_extended(model: str) -> None:
     spec = _named(model)
-    before = _before(model)
-    for limb in _limbs(spec):
+    before = built(spec, Mass("*", scale=1.0))
+    for limb in [body.name for body in spec.bodies[1:] if body.parent.parent is not None]:
         subtree = float(before.body(limb).subtreemass[0])
         assert mass(built(spec, Remove(limb))) == pytest.approx(mass(before) - subtree, abs=1e-9)
         copied = built(spec, AddLimb(limb, "_copy", 0.5))
