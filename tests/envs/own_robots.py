@@ -54,10 +54,10 @@ class Rear:
 
 
 class Nonsense:
-    """Return the names of non-numbers."""
+    """A task whose reward is not a number."""
 
     def reward(self, robot: RobotState) -> dict[str, float]:
-        """Return the reward of nonsense."""
+        """Return NaN."""
         return {"nonsense": float("nan")}
 
 

@@ -42,7 +42,7 @@ def test_a_docstring_is_a_page_of_the_env(name: str) -> None:
 
 
 def layout_rows(layout: Layout, title: str) -> list[tuple[str, ...]]:
-    """Return a row per number; three observations of one kind or more share one."""
+    """Return a row per number; three or more observations of one kind share a row."""
     rows: list[tuple[str, ...]] = []
     first = 0
     for (kind, low, high, _), group in groupby(layout, _kind_of):

@@ -18,10 +18,8 @@ from tests.morphology.scenes import ASSETS
 
 _PLACE = {"exclude_current_positions_from_observation": False}
 _NO_CONTACTS = {"include_cfrc_ext_in_observation": False}
-_JOINTS = {
-    f"include_{block}_in_observation": False
-    for block in ("cinert", "cvel", "qfrc_actuator", "cfrc_ext")
-}
+_HIDDEN = ("cinert", "cvel", "qfrc_actuator", "cfrc_ext")
+_JOINTS = {f"include_{block}_in_observation": False for block in _HIDDEN}
 _PLANAR = ("HalfCheetah", "Hopper", "Walker2d", "Swimmer")
 _OTHER_BODY = (
     AddLimb("aux_1", "_5", 0.8, 0.7),
@@ -40,19 +38,10 @@ _CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "Humanoid's joints and place": ("shapechanger/Humanoid-v1", _JOINTS | _PLACE),
     "Ant with its place": ("shapechanger/Ant-v1", _PLACE),
     "BigAnt without contacts": ("shapechanger/BigAnt-v1", _NO_CONTACTS),
-    "ExtendedAnt with place, without contacts": (
-        "shapechanger/ExtendedAnt-v1",
-        _PLACE | _NO_CONTACTS,
-    ),
-    "ExtendedAnt without foot motors": (
-        "shapechanger/ExtendedAnt-v1",
-        {"body": "ExtendedAntPassive"},
-    ),
+    "larger spaces": ("shapechanger/ExtendedAnt-v1", _PLACE | _NO_CONTACTS),
+    "no foot motors": ("shapechanger/ExtendedAnt-v1", {"body": "ExtendedAntPassive"}),
     "an ant of a file": ("shapechanger/OwnRobot-v1", {"path": ASSETS + "/ant.xml"}),
-    "five legs, a stiff ankle and a shin": (
-        "shapechanger/Ant-v1",
-        {"body": to_json(_OTHER_BODY)} | _PLACE,
-    ),
+    "another body": ("shapechanger/Ant-v1", {"body": to_json(_OTHER_BODY)} | _PLACE),
 }
 _J = mujoco.mjtJoint
 _ONE_NUMBER = {_J.mjJNT_HINGE: "angle", _J.mjJNT_SLIDE: "position"}

@@ -14,6 +14,7 @@ import pytest
 import shapechanger
 from shapechanger.errors import TaskError
 from shapechanger.morphology import AddMotor
+from shapechanger.morphology.pose import floor_height
 from tests.envs.own_robots import DOG
 
 _BALL = '<body name="ball" pos="3 0 .1"><freejoint/><geom size=".1" mass=".1"/></body>'
@@ -99,6 +100,7 @@ def test_the_floor_may_be_anywhere(tmp_path: Path, height: float) -> None:
     _, plain = _env(tmp_path, DOG)
     env, inner = _env(tmp_path, moved)
     assert inner.standing_height == pytest.approx(plain.standing_height, abs=1e-6)
+    assert floor_height(inner.model, inner.init_qpos) == pytest.approx(height)
     env.reset(seed=0)
     for share, stands in ((0.5, True), (0.3, False)):
         inner.data.qpos[2] = height + share * inner.standing_height

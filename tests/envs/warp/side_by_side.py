@@ -65,9 +65,8 @@ def many(name: str, **arguments: Any) -> tuple[WarpVectorEnv, list[Any]]:
     ]
     for env in alone:
         if env.model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
-            env.model.opt.solver = (
-                mujoco.mjtSolver.mjSOL_NEWTON
-            )  # A device has no PGS and uses Newton's.
+            # A device has no PGS and uses Newton's.
+            env.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     return worlds, alone
 
 

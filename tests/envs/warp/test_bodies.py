@@ -124,33 +124,18 @@ def test_bodies_share_a_batch_if_mujoco_warp_can_share_their_arrays(edit: Edit) 
 
 def test_bodies_with_and_without_a_kind_of_force_share_no_batch() -> None:
     """A fluid, or a friction in joints, needs a separate batch if others have none."""
-    plain: Any = gym.make("shapechanger/Ant-v1").unwrapped
-    bodies = []
-    for change in ("opt.density", "dof_frictionloss"):
-        other: Any = gym.make("shapechanger/Ant-v1").unwrapped
-        if change == "opt.density":
-            other.model.opt.density = 3.0
-        else:
-            other.model.dof_frictionloss[:] = 0.1
-        bodies.append(device_body("", other.model, {}))
-    base = device_body("", plain.model, {})
-    names = [differing_arrays(base, body) for body in bodies]
-    assert names == [
-        ["has_fluid"],
-        ["zeros of dof_frictionloss"],
-    ]
+    plain, wet, rough = (gym.make("shapechanger/Ant-v1").unwrapped.model for _ in range(3))
+    wet.opt.density = 3.0
+    rough.dof_frictionloss[:] = 0.1
+    base, *others = (device_body("", model, {}) for model in (plain, wet, rough))
+    names = [differing_arrays(base, other) for other in others]
+    assert names == [["has_fluid"], ["zeros of dof_frictionloss"]]
 
 
 def test_bodies_of_other_shapes_form_batches() -> None:
     """If spaces differ, there is one tensor of observations or actions per batch, not per world."""
-    envs = shapechanger.make_vec(
-        "Ant",
-        3,
-        backend="warp",
-        device="cpu",
-        bodies=["ExtendedAnt", "BigAnt", "ExtendedAnt"],
-        max_episode_steps=2,
-    )
+    bodies, more = ["ExtendedAnt", "BigAnt", "ExtendedAnt"], {"max_episode_steps": 2}
+    envs = shapechanger.make_vec("Ant", 3, backend="warp", device="cpu", bodies=bodies, **more)
     assert [batch.numbers.tolist() for batch in envs.batches] == [[0, 2], [1]]
     observations, infos = envs.reset(seed=0)
     assert [part.shape for part in observations] == [(2, 137), (1, 105)]

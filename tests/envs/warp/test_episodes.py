@@ -20,13 +20,8 @@ PUSH = torch.tensor([[3.0], [0.0], [0.0]])
 
 def pendulums(**arguments: Any) -> WarpVectorEnv:
     """Return three pendulums; pushed with `PUSH`, the first one falls within some ten steps."""
-    envs = shapechanger.make_vec(
-        "InvertedPendulum",
-        WORLDS,
-        backend="warp",
-        device="cpu",
-        **arguments,
-    )
+    more = {"backend": "warp", "device": "cpu", **arguments}
+    envs = shapechanger.make_vec("InvertedPendulum", WORLDS, **more)
     envs.reset(seed=0)
     return envs
 
@@ -73,7 +68,7 @@ def test_ends_and_divergence_are_always_in_the_infos(task_infos: bool) -> None:
     assert ("reward_survive" in infos) == task_infos
 
 
-def test_time_limits_are_those_of_the_id() -> None:
+def test_worlds_have_the_time_limit_of_the_id() -> None:
     """An episode is truncated after `max_episode_steps` of the spec, counted from its start."""
     assert pendulums().max_episode_steps == 1000
     envs = pendulums(max_episode_steps=3)

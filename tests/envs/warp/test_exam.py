@@ -63,7 +63,7 @@ def test_a_step_from_the_same_state_has_the_same_results(
                 assert told[f"_{name}"][i]
 
 
-def test_starts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> None:
+def test_starts_follow_the_rules_of_the_cpu_env(pair: tuple[WarpVectorEnv, list[Any]]) -> None:
     """Start states fit the CPU env's rules, with the same observations, layouts and infos."""
     worlds, alone = pair
     observations, infos = worlds.reset(seed=5)
