@@ -29,7 +29,7 @@ _LONGEST_BODY: Final = 60
 
 
 def check_action(env: Any, action: Any) -> NDArray[Any]:
-    """Return an action of any dtype as an array, or refuse its shape or numbers not finite."""
+    """Return an action as an array, or refuse its shape, or numbers that are not finite."""
     name = type(env).__name__ if env.spec is None else env.spec.id
     try:
         array = np.asarray(action)

@@ -233,7 +233,7 @@ def has_ended(task: OwnTask, name: str, robot: RobotState) -> bool:
 
 
 def observed(task: OwnTask) -> Sequence[str] | None:
-    """Return the names and globs that a task observes, None for the default, or refuse them."""
+    """Return the names and globs that a task observes; None for the default."""
     given: Any = getattr(task, "observe", None)
     names: list[Any] = [] if given is None or isinstance(given, str) else list(given)
     if given is not None and not (names and all(isinstance(each, str) for each in names)):

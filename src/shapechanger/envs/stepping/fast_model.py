@@ -39,9 +39,9 @@ _UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhf
 def find_fast_model(
     model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
 ) -> mujoco.MjModel | None:
-    """Return a cheaper model that steps the data of another and moves equally, None if not known.
+    """Return a cheaper model that steps the data of a model with equal motion; None if unknown.
 
-    `make_spec` returns the spec of the model, which is compiled and unedited.
+    The model is unedited, and `make_spec` returns the spec from which it was compiled.
     """
     # Other models may have constraints in several trees, or elements that the rules do not cover.
     if (
