@@ -1,15 +1,14 @@
-"""Draw the clips of gallery and docs, and the strip of the README: `make gallery`.
+"""Draw the clips of the documentation, and the strip of the README: `make gallery`.
 
 `python scripts/draw_pictures.py --only driving` draws one of them, and `--out FOLDER` writes to
-another folder than docs/pictures. The clip of transfer between ants first runs a study of a few
-minutes in results/gallery, unless the study is there already.
+another folder than docs/pictures. Clip and strip of the transfer between ants first run a study of
+a few minutes in results/gallery, unless it is there already.
 """
-
-from __future__ import annotations
 
 import argparse
 import math
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -40,8 +39,6 @@ Panel = list[Picture]
 
 PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
 STUDY: Final = Path("results", "gallery")
-_VEHICLES: Final = ("Car", "Tank", "Truck", "Boat")
-
 _SIZE: Final = 300, 240
 _FPS: Final = 20
 
@@ -57,7 +54,7 @@ def main() -> None:
         if asked.only in (None, name):
             frames = [np.concatenate(row, axis=1) for row in zip(*film(), strict=True)]
             write_film(cast("Any", frames), asked.out / f"{name}.webm", _FPS)
-            # The image that stands for the clip.
+            # Pages show this image until the clip plays.
             iio.imwrite(asked.out / f"{name}.jpg", frames[len(frames) // 3], quality=80)
     if asked.only in (None, STRIP):
         _photograph_transfer(asked.out / f"{STRIP}.jpg")
@@ -81,7 +78,7 @@ def _bodies(
 
 
 def _made(ref: EnvRef, view: dict[str, Any] | None, size: tuple[int, int] = _SIZE) -> Any:
-    """Make an env that renders; `view` is a body's camera, and None for a finger."""
+    """Make an env that renders; `view` is the camera of a body, and None for a finger."""
     of_body = {} if view is None else {"shadows": True, "default_camera_config": view}
     return ref.make(render_mode="rgb_array", width=size[0], height=size[1], **of_body)
 
@@ -89,27 +86,25 @@ def _made(ref: EnvRef, view: dict[str, Any] | None, size: tuple[int, int] = _SIZ
 def _film(
     ref: EnvRef, policy: Any, seconds: float, view: dict[str, Any] | None = None, seed: int = 0
 ) -> Panel:
-    """Film a policy; a body that falls stays as it is."""
-    env = _made(ref, view)
-    frames = list(_played(env, policy, round(seconds * _FPS), _FPS, seed))
-    env.close()
-    return frames
+    """Film a policy; the last frame is repeated after the end of the episode."""
+    with closing(_made(ref, view)) as env:
+        return list(_played(env, policy, round(seconds * _FPS), _FPS, seed))
 
 
 def _played(env: Any, policy: Any, count: int, fps: int, seed: int) -> Iterator[Picture]:
-    """Yield frames of a policy; the last one again after the end of the episode."""
+    """Yield `count` frames of a policy, `fps` of them per second of the simulation."""
     observation, _ = env.reset(seed=seed)
-    taken, over = 0, False
+    steps, over = 0, False
     for number in range(count):
-        while not over and taken * fps < number * env.metadata["render_fps"]:
+        while not over and steps * fps < number * env.metadata["render_fps"]:
             action = policy.act(np.asarray(observation)[None])[0]
             observation, _, terminated, truncated, _ = env.step(action)
-            taken, over = taken + 1, terminated or truncated
+            steps, over = steps + 1, terminated or truncated
         yield env.render()
 
 
 def _finger() -> list[Panel]:
-    """Film the shipped policies: two targets reached, and a figure eight followed."""
+    """Film the finger's shipped policies: it reaches two targets and follows a figure eight."""
     reach, track = (load_policy(POLICIES[name]) for name in ("reach", "track"))
     target = EnvRef("shapechanger/Finger-v1")
     path = EnvRef("shapechanger/FingerTrack-v1", {"path": "figure-eight"})
@@ -117,40 +112,37 @@ def _finger() -> list[Panel]:
     return [reached, _film(path, track, 4.0, seed=1)]
 
 
-# Direction of the view from a vehicle's heading: 0 is from behind.
+# Azimuth of the camera around a vehicle; at 0 it is behind the vehicle.
 _BESIDE: Final = math.radians(30.0)
 _INDOORS: Final = ("corridor", FLOODED)
-# Gamma of the view from outside where lamps are the only light.
+# Gamma of the view from outside in a world that only lamps light.
 _DARK: Final = 0.7
 _COURSE: Final = 5
 
 
 def _drive(name: str, driver: str, seconds: float, size: tuple[int, int] = _SIZE) -> list[Panel]:
     """Film a vehicle that a shipped clone drives, from outside and through its camera."""
-    env = cast("Any", EnvRef(f"shapechanger/{name}-v1", {"courses": "held-out"}).make())
     policy = load_policy(CLONES[driver])
-    picture, _ = env.reset(seed=_COURSE)
-    world = env.unwrapped.world
-    wide, high = size
-    exposure = _DARK if world.course.world in _INDOORS else 1.0
-    panels: list[Panel] = [[], []]
-    for _ in range(round(seconds * _FPS)):
-        drawn = world.outside(2 * wide, 2 * high, 1.3 * world.reach, azimuth_rad=_BESIDE)
-        light = (_smooth(drawn) / 255.0) ** exposure
-        panels[0].append((255.0 * light).astype(np.uint8))
-        seen = Image.fromarray(picture).resize(size, Image.Resampling.BICUBIC)
-        panels[1].append(np.asarray(seen))
-        picture, _, terminated, truncated, _ = env.step(policy.predict(picture))
-        if terminated or truncated:
-            break
-    env.close()
-    return panels
+    outside: Panel = []
+    inside: Panel = []
+    with closing(EnvRef(f"shapechanger/{name}-v1", {"courses": "held-out"}).make()) as env:
+        image, _ = env.reset(seed=_COURSE)
+        world = cast("Any", env.unwrapped).world
+        gamma = _DARK if world.course.world in _INDOORS else 1.0
+        over = False
+        while not over and len(outside) < round(seconds * _FPS):
+            large = world.outside(2 * size[0], 2 * size[1], 1.3 * world.reach, azimuth_rad=_BESIDE)
+            outside.append((255.0 * (_halved(large) / 255.0) ** gamma).astype(np.uint8))
+            seen = Image.fromarray(image).resize(size, Image.Resampling.BICUBIC)
+            inside.append(np.asarray(seen))
+            image, _, terminated, truncated, _ = env.step(policy.predict(image))
+            over = terminated or truncated
+    return [outside, inside]
 
 
-def _smooth(drawn: NDArray[Any]) -> NDArray[np.float64]:
-    """Return a picture of half the size, in which each pixel averages four."""
-    high, wide, _ = drawn.shape
-    return drawn.reshape(high // 2, 2, wide // 2, 2, 3).mean(axis=(1, 3))
+def _halved(image: NDArray[Any]) -> Picture:
+    """Return an image of half the size, in which each pixel averages four."""
+    return np.asarray(Image.fromarray(image).reduce(2))
 
 
 _STEPS: Final = 196_608
@@ -158,22 +150,23 @@ STRIP: Final = "ants-strip"
 
 
 def _transferred() -> dict[str, tuple[EnvRef, Any]]:
-    """Transfer from Ant to BigAnt, and return env and policy before and after, by caption."""
-    given, start = Path("reference"), reference_policy("shapechanger/Ant-v1")
+    """Transfer from Ant to BigAnt, and return four envs with their policies, keyed by caption."""
+    given = Path("reference")
     Transfer(
         source="Ant", target="BigAnt", source_policy=given, seeds=2, steps=_STEPS, out=STUDY
     ).run()
     study = read_json(STUDY / STUDY_FILE, Study, f"delete {STUDY}")
+    source = load_policy(reference_policy("shapechanger/Ant-v1"))
+    ant, big = study.plan.task.source, study.plan.task.target
     tuned, scratch = (
         load_policy(Run(arm, median_index(study, arm)).policy_file(STUDY))
         for arm in ("fine-tune", "scratch")
     )
-    task, source = study.plan.task, load_policy(start)
     return {
-        "Ant, its reference policy": (task.source, source),
-        "BigAnt, the same policy": (task.target, source),
-        f"BigAnt, the same policy after {_STEPS:,} steps of fine-tuning": (task.target, tuned),
-        f"BigAnt, a policy from scratch after {_STEPS:,} steps": (task.target, scratch),
+        "Ant, its reference policy": (ant, source),
+        "BigAnt, the same policy": (big, source),
+        f"BigAnt, the same policy after {_STEPS:,} steps of fine-tuning": (big, tuned),
+        f"BigAnt, a policy from scratch after {_STEPS:,} steps": (big, scratch),
     }
 
 
@@ -183,7 +176,7 @@ def _film_transfer() -> list[Panel]:
     return [_film(ref, policy, 10.0, view, EVALUATION_SEED) for ref, policy in shown]
 
 
-# The view of the strip: 22 m of the floor from the side, once a second.
+# Size of a photograph in pixels, width of the floor in it, its duration and the camera's distance.
 _STRIP: Final = 1170, 110
 _STRIP_M: Final = 22.0
 _STRIP_S: Final = 5
@@ -192,13 +185,12 @@ _VISIBLE: Final = 12  # Smallest difference of a pixel from the empty floor, of 
 
 
 def _photograph_transfer(path: Path) -> None:
-    """Draw one photograph per policy: a fixed camera, exposed once a second for five seconds."""
+    """Draw one photograph per policy, which a fixed camera exposes once a second."""
     shown = _transferred()
     figure = Figure(figsize=(9.0, 1.1 * len(shown)), layout="constrained")
-    rows = zip(figure.subplots(len(shown), 1), shown.items(), strict=True)
-    for axes, (caption, (ref, policy)) in rows:
-        picture, distance_m = _photographed(ref, policy)
-        axes.imshow(picture, aspect="equal")
+    for axes, caption in zip(figure.subplots(len(shown), 1), shown, strict=True):
+        photograph, distance_m = _photographed(*shown[caption])
+        axes.imshow(photograph, aspect="equal")
         title = f"{caption}: {distance_m:.1f} m in {_STRIP_S} s"
         axes.set_title(title, fontsize=9, loc="left", pad=2)
         axes.axis("off")
@@ -209,27 +201,25 @@ def _photographed(ref: EnvRef, policy: Any) -> tuple[Picture, float]:
     """Return a multiple exposure of an ant that walks past a fixed camera, and its progress, m."""
     wide, high = _STRIP
     view = {"lookat": np.array([_STRIP_M / 2 - 2.0, 0.0, 0.4]), "distance": _AWAY_M}
-    env = _made(ref, {**view, "azimuth": 90.0, "elevation": -6.0}, (2 * wide, 2 * high))
-    data, model = env.unwrapped.data, env.unwrapped.model
-    model.vis.global_.fovy = math.degrees(2.0 * math.atan(_STRIP_M * high / wide / 2.0 / _AWAY_M))
-    exposures: Panel = []
-    places: list[float] = []
-    for exposure in _played(env, policy, _STRIP_S + 1, 1, EVALUATION_SEED):
-        exposures.append(exposure)
-        places.append(float(data.qpos[0]))
-    data.qpos[2] = -100.0  # Below the floor, where it is not in view.
-    mujoco.mj_forward(model, data)
-    picture = empty = env.render().astype(int)
-    env.close()
-    for exposure in exposures:
-        ant = np.abs(exposure.astype(int) - empty).max(axis=2, keepdims=True) > _VISIBLE
-        picture = np.where(ant, exposure, picture)
-    return _smooth(picture).astype(np.uint8), places[-1] - places[0]
+    view |= {"azimuth": 90.0, "elevation": -6.0}
+    with closing(_made(ref, view, (2 * wide, 2 * high))) as env:
+        data, model = env.unwrapped.data, env.unwrapped.model
+        tangent = _STRIP_M * high / wide / 2.0 / _AWAY_M
+        model.vis.global_.fovy = math.degrees(2.0 * math.atan(tangent))
+        played = _played(env, policy, _STRIP_S + 1, 1, EVALUATION_SEED)
+        exposures = [(frame, float(data.qpos[0])) for frame in played]
+        data.qpos[2] = -100.0  # Below the floor, where it is not in view.
+        mujoco.mj_forward(model, data)
+        photograph = empty = env.render().astype(int)
+    for frame, _ in exposures:
+        is_ant = np.abs(frame.astype(int) - empty).max(axis=2, keepdims=True) > _VISIBLE
+        photograph = np.where(is_ant, frame, photograph)
+    return _halved(photograph.astype(np.uint8)), exposures[-1][1] - exposures[0][1]
 
 
 CLIPS: Final[Mapping[str, Callable[[], list[Panel]]]] = {
     "walking": lambda: _bodies("Ant AmputatedAnt BigAnt ExtendedAnt", seconds=8.0),
-    # Starts vary more than in the training of the policies, so that the motion is visible.
+    # Starts vary more than in training, so that the motion is visible.
     "balancing": lambda: _bodies(
         "SmallInvertedPendulum InvertedPendulum BigInvertedPendulum",
         "InvertedDoublePendulum",
@@ -242,7 +232,7 @@ CLIPS: Final[Mapping[str, Callable[[], list[Panel]]]] = {
     ),
     "driving": lambda: [
         [np.concatenate(pair) for pair in zip(*_drive(name, name.lower(), 8.0), strict=True)]
-        for name in _VEHICLES
+        for name in ("Car", "Tank", "Truck", "Boat")
     ],
     "corridor": lambda: _drive("Car", "car", 12.0, (480, 360)),
     "finger-reach-follow": _finger,

@@ -1,13 +1,10 @@
-"""Write the generated part of typings/mujoco: MuJoCo's bindings ship no type stubs.
+"""Generate type stubs in typings/mujoco, because MuJoCo's bindings ship none.
 
-`make check` runs it after each installation. pybind11-stubgen reads the signatures out of the
-compiled modules, and `_CORRECTIONS` state what it cannot know; the modules of MuJoCo that are
-Python have stubs written by hand next to the generated ones. Results that are rarely None, such as
-the parent of the world or a body looked up by a wrong name, have the type `X | Any`, so that both
-`body.parent.name` and `body.parent is None` pass.
+`make check` runs this after each installation. pybind11-stubgen reads the signatures of compiled
+modules, and `_CORRECTIONS` add types that it cannot infer; stubs of MuJoCo's Python modules are
+written by hand. Results that are rarely None, such as the parent of the world, have the type
+`X | Any`, so that both `body.parent.name` and `body.parent is None` pass.
 """
-
-from __future__ import annotations
 
 import re
 import subprocess
@@ -19,26 +16,25 @@ import mujoco
 
 _TYPINGS: Final = Path(__file__).resolve().parents[1] / "typings"
 _PARTS: Final = ("callbacks", "constants", "enums", "functions", "render", "specs", "structs")
-_MODULES: Final = [f"mujoco._{part}" for part in _PARTS]
 _NUMBER: Final = r"typing\.Supports(?:Int|Float) \| typing\.SupportsIndex"
 _ELEMENTS: Final = {
     name.removeprefix("Mjs").lower(): name for name in dir(mujoco) if name.startswith("Mjs")
 }
 
 _CORRECTIONS: Final = (
-    # An attribute called `global` is no Python; the bindings have `global_` too.
+    # An attribute `global` is a syntax error in Python; the bindings also have `global_`.
     (r"^    global: .*\n", ""),
     (
         r"^import typing$",
         "import builtins\nimport mujoco._specs\nimport numpy.typing\nimport typing",
     ),
-    # Arrays: the bindings convert lists, except where they write into the argument.
+    # Array arguments accept lists, except those that the bindings write into.
     (r'typing\.Annotated\[([^"\n]*), "\[[^"]*\]", "flags\.writeable"[^]\n]*\]', r"\1"),
     (r'(: )typing\.Annotated\[numpy\.typing\.[^"\n]*, "\[[^"]*\]"\]', r"\1numpy.typing.ArrayLike"),
     (r'typing\.Annotated\[([^"\n]*), "[^\n"]*"\]', r"\1"),
     (rf"collections\.abc\.Sequence\[{_NUMBER}\]", "numpy.typing.ArrayLike"),
     (r"(\.setter\n    def \w+\(self, arg1: )typing\.Any\)", r"\1numpy.typing.ArrayLike)"),
-    # Without these, a value of a spec may be of an unknown type.
+    # Without the following, pyright reports unknown types.
     (r"(: |-> )dict\b(?!\[)", r"\1dict[str, typing.Any]"),
     (r"(: |-> |\[)tuple\b(?!\[)", r"\1builtins.tuple[typing.Any, ...]"),
     (r"(def compile\(.*\) -> )typing\.Any", r"\1mujoco._structs.MjModel"),
@@ -56,7 +52,7 @@ _CORRECTIONS: Final = (
 
 
 def _corrected(text: str) -> str:
-    """Return the text of a stub with what pybind11-stubgen could not know."""
+    """Return the text of a stub with the corrections and with typed lists of elements."""
     for pattern, correction in _CORRECTIONS:
         text = re.sub(pattern, correction, text, flags=re.MULTILINE)
     for element, kind in _ELEMENTS.items():
@@ -68,7 +64,8 @@ def _corrected(text: str) -> str:
 def main() -> None:
     """Write the stubs."""
     command = [sys.executable, "-m", "pybind11_stubgen", "--ignore-all-errors"]
-    command += ["--numpy-array-use-type-var", "-o", str(_TYPINGS), *_MODULES]
+    command += ["--numpy-array-use-type-var", "-o", str(_TYPINGS)]
+    command += [f"mujoco._{part}" for part in _PARTS]
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
     for part in _PARTS:
         path = _TYPINGS / "mujoco" / f"_{part}.pyi"

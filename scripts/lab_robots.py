@@ -3,8 +3,6 @@
 Run it after a change of `lab-*.toml`; a test compares the two.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -15,13 +13,11 @@ from shapechanger.vehicles.twin import read_robot
 
 
 def lab_robots_json() -> str:
-    """Return the content of the file."""
-    robots = {name: read_robot(name) for name in ("lab-boat", "lab-car", "lab-tank", "lab-truck")}
-    for name, robot in robots.items():
-        robots[name] = msgspec.structs.replace(robot, path=name)
-    return (
-        json.dumps(msgspec.to_builtins(robots, enc_hook=int), indent=1, ensure_ascii=False) + "\n"
-    )
+    """Return the content of `lab_robots.json`."""
+    names = ("lab-boat", "lab-car", "lab-tank", "lab-truck")
+    robots = {name: msgspec.structs.replace(read_robot(name), path=name) for name in names}
+    plain = msgspec.to_builtins(robots, enc_hook=int)
+    return json.dumps(plain, indent=1, ensure_ascii=False) + "\n"
 
 
 if __name__ == "__main__":

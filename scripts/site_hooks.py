@@ -1,11 +1,9 @@
 """Hooks of MkDocs for the site, which `make docs` builds: pages from the code, and clips.
 
 In the site a file has its path in the repository, so that its links lead where they lead on a code
-host: from `docs/atlas.md` to `../CONTRIBUTING.md`. A page has a comment in the place of each table
-of keys of profiles and messages, such as `<!-- keys: profile limits -->`.
+host: from `docs/atlas.md` to `../CONTRIBUTING.md`. Comments such as `<!-- keys: profile limits -->`
+are replaced by tables of the keys of profiles and messages.
 """
-
-from __future__ import annotations
 
 import html
 import json
@@ -37,10 +35,14 @@ _ALWAYS: Final = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 """Files outside `docs` that the navigation names."""
 
 _LINK: Final = re.compile(r"\]\(([^)\s#]+)")
-# Words of a page of docs for the site alone: they link to pages that no code host has.
+# Text that only the site shows, because it links to pages that no code host has.
 _ONLY_HERE: Final = re.compile(r"<!-- site: (.*?) -->", re.DOTALL)
 # An image that leads to a clip: code hosts show no clips inside a page.
 _CLIP: Final = re.compile(r"\[!\[([^\]]*)\]\(([^)\s]+)\)\]\(([^)\s]+\.webm)\)")
+_PLAYER: Final = (
+    '<video controls loop muted playsinline preload="none" aria-label="{}" poster="{}" src="{}">'
+    "</video>"
+)
 _SEARCH: Final = '<div class="md-search" data-md-component="search" role="dialog"'
 _EXAMPLE: Final = re.compile(r"(?:^>>> .*\n?(?:^(?!$).*\n?)*)+", re.MULTILINE)
 
@@ -57,19 +59,16 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         if file.src_dir == config.docs_dir:
             files.remove(file)
             add(_DOCS + file.src_uri, abs_src_path=file.abs_src_path)
-    waiting = [file.src_uri for file in files.documentation_pages()]
-    seen = {*waiting}
-    waiting += _ALWAYS
-    while waiting:
-        path = waiting.pop()
-        if path not in seen:
-            seen.add(path)
+    pages = [file.src_uri for file in files.documentation_pages()]
+    found = [*pages, *_ALWAYS]
+    for path in found:  # The list grows by the files that its pages link to.
+        if path not in pages:
             add(path, abs_src_path=str(ROOT / path))
         if path.endswith(".md"):
-            for link in _LINK.findall((ROOT / path).read_text()):
-                target = posixpath.normpath(posixpath.join(posixpath.dirname(path), link))
-                if target not in seen and (ROOT / target).is_file():
-                    waiting.append(target)
+            folder = posixpath.dirname(path)
+            links = _LINK.findall((ROOT / path).read_text())
+            targets = {posixpath.normpath(posixpath.join(folder, link)) for link in links}
+            found += [one for one in targets if one not in found and (ROOT / one).is_file()]
     sections: dict[str, list[str]] = {}
     for made in (environment_pages(), wiring_pages(), api_pages()):
         for path, content in made.items():
@@ -92,16 +91,7 @@ def _extended(nav: Any, sections: dict[str, list[str]]) -> Any:
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Add the tables of keys and the players of clips to a page."""
     markdown = _ONLY_HERE.sub(r"\1", with_keys(markdown))
-    return _CLIP.sub(_player, markdown)
-
-
-def _player(match: re.Match[str]) -> str:
-    """Return a player for an image that leads to a clip."""
-    words, picture, clip = (html.escape(part) for part in match.groups())
-    return (
-        f'<video controls loop muted playsinline preload="none" poster="{picture}" '
-        f'aria-label="{words}" src="{clip}"></video>'
-    )
+    return _CLIP.sub(lambda match: _PLAYER.format(*map(html.escape, match.groups())), markdown)
 
 
 def on_post_page(output: str, **_: Any) -> str:
@@ -112,34 +102,26 @@ def on_post_page(output: str, **_: Any) -> str:
 class FencedExamples(griffe.Extension):
     """Put the examples of docstrings into fences; in Markdown `>>>` would quote them."""
 
-    def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
-        """Rewrite the docstrings of a package that Griffe has loaded, and of all that is in it."""
-        self._rewrite(pkg)
-
-    def _rewrite(self, obj: griffe.Object) -> None:
-        for member in obj.members.values():
-            if not isinstance(member, griffe.Alias):
-                self._rewrite(member)
+    def on_instance(self, *, obj: griffe.Object, **_: Any) -> None:
+        """Rewrite the docstring of an object that Griffe has read."""
         if obj.docstring is not None:
             obj.docstring.value = _EXAMPLE.sub(
                 lambda match: f"```pycon\n{match[0].rstrip()}\n```\n", obj.docstring.value
             )
 
 
-# Tables of keys
-
 _MARK: Final = re.compile(r"^<!-- keys: (\w+) (\w+) -->$", re.MULTILINE)
 _HEAD: Final = ("Key", "Values", "Default", "Meaning")
 
 
 def with_keys(markdown: str) -> str:
-    """Return a page with a table of keys in the place of each of its comments."""
+    """Return a page in which tables of keys replace their comments."""
     made = {"profile": _profile_table, "messages": _messages}
     return _MARK.sub(lambda mark: "\n\n".join(filter(None, made[mark[1]](mark[2]))), markdown)
 
 
 def _profile_table(name: str) -> Iterator[str]:
-    """Return the keys of a table of a profile, and of each driver that it may name."""
+    """Yield the keys of a table of a profile, and those of each driver that it may name."""
     chosen = DRIVERS.get(name, {})
     yield _keys(TABLES[name], chosen)
     for choosing, chips in chosen.items():
@@ -159,7 +141,7 @@ def _profile_table(name: str) -> Iterator[str]:
 
 
 def _keys(kinds: Iterable[type], options: Mapping[str, Iterable[str]]) -> str:
-    """Return a table of the keys of some types; `options` are the names that a key can have."""
+    """Return a table of the keys of some types; `options` has the values of keys of chips."""
     rows: list[tuple[str, ...]] = []
     for kind in kinds:
         meanings = _documented(kind)[1]
@@ -175,7 +157,7 @@ def _keys(kinds: Iterable[type], options: Mapping[str, Iterable[str]]) -> str:
 
 
 def _messages(side: str) -> Iterator[str]:
-    """Return the messages of one side, the client's or the robot's, with Python's types."""
+    """Yield the messages of one side, the client's or the robot's, with Python's types."""
     for kind in {"client": ClientMessage, "robot": RobotMessage}[side].__subclasses__():
         summary, meanings = _documented(kind)
         yield f"#### `{kind.__struct_config__.tag}`"
@@ -201,7 +183,7 @@ def _default(name: str, field: inspect.Field) -> str:
 
 
 def _documented(kind: type) -> tuple[str, dict[str, str]]:
-    """Return what the docstring of a class says before the attributes, and each one's meaning."""
+    """Return the text of a class's docstring, and the meanings of its attributes by name."""
     summary, meanings = "", {}
     for base in reversed(kind.__mro__):
         doc = griffe.Docstring(cleandoc(base.__doc__ or ""))

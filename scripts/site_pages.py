@@ -1,7 +1,5 @@
 """Pages of the site that are made from the code: environments, wiring, and the API reference."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import logging
@@ -39,21 +37,13 @@ def _page(*parts: str) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-# Environments
-
-_SIZE: Final = 480, 360
-_QUALITY: Final = 80
-
-
 def environment_pages() -> Pages:
-    """Return a page for each env that `import shapechanger` registers, and their index.
-
-    The bodies of ODRL share a page.
-    """
+    """Return a page for each registered env, one page for all bodies of ODRL, and an index."""
     pages: Pages = {"environments/index.md": ""}
     rows: list[tuple[str, ...]] = []
-    ours = [env_id for env_id in gym.registry if env_id.startswith(f"{NAMESPACE}/")]
-    for env_id in (env_id for env_id in ours if env_id not in ODRL_ENVS):
+    for env_id in gym.registry:
+        if not env_id.startswith(f"{NAMESPACE}/") or env_id in ODRL_ENVS:
+            continue
         short, shown = _short(env_id), ""
         pages[f"environments/{short}.md"], picture = _environment(env_id)
         if picture is not None:
@@ -84,23 +74,19 @@ def environment_pages() -> Pages:
 
 
 def _environment(env_id: str) -> tuple[str, bytes | None]:
-    """Return the page of an env, from registry and docstring, and its image at a start, as JPEG.
-
-    Raises:
-        RenderError: If nothing renders on CI, where nothing may be missing.
-    """
+    """Return the page of an env, and a JPEG of its start; None if this machine cannot render."""
     short, spec, picture = _short(env_id), gym.registry[env_id], None
     module, _, name = cast("str", spec.entry_point).partition(":")
-    # The others need a robot or a file.
+    # Other envs need a robot or a file.
     if not short.startswith("Remote") and env_id != OWN_ROBOT:
         with EnvRef(env_id).make() as env:
             try:
                 if hasattr(env.unwrapped, "picture"):
                     env.reset(seed=0)
-                    frame = cast("Any", env.unwrapped).picture(*_SIZE)
-                    picture = iio.imwrite("<bytes>", frame, extension=".jpg", quality=_QUALITY)
+                    frame = cast("Any", env.unwrapped).picture(480, 360)
+                    picture = iio.imwrite("<bytes>", frame, extension=".jpg", quality=80)
             except RenderError as error:
-                if os.environ.get("CI") == "true":
+                if os.environ.get("CI") == "true":  # There, every page must have its image.
                     raise
                 _LOG.info("The page of %s has no picture: %s", env_id, error)
     steps, threshold = spec.max_episode_steps, spec.reward_threshold
@@ -115,18 +101,17 @@ def _environment(env_id: str) -> tuple[str, bytes | None]:
         f"changes from {first}": f"`shapechanger envs compare {first} {short}`" if differs else "",
         "class": f"[`{module}.{name}`][{module}.{name}]",
     }
-    content = _page(
+    return _page(
         f"# {short}",
         f"`{env_id}`: {_summary(env_id)}.",
         f"![{short} at the start of an episode]({short}.jpg)" if picture else "",
         table(("property", "value"), [row for row in facts.items() if row[1]]),
         _described(f"{module}.{name}", "members: []", "show_bases: false", "heading_level: 1"),
-    )
-    return content, picture
+    ), picture
 
 
 def _described(path: str, *options: str) -> str:
-    """Return where MkDocs puts the docstrings of an object, without its name."""
+    """Return the directive by which MkDocs shows the docstrings of an object, without its name."""
     unnamed = ("show_root_heading: false", "show_root_toc_entry: false")
     return "\n      ".join([f"::: {path}\n    options:", *unnamed, *options])
 
@@ -136,19 +121,15 @@ def _short(env_id: str) -> str:
 
 
 def _summary(env_id: str) -> str:
-    """Return the line of the catalogue, or else the first one of the docstring."""
-    if env_id in (known := summaries()):
-        return known[env_id]
-    first, *_ = (inspect.getdoc(_loaded(str(gym.registry[env_id].entry_point))) or "").split("\n")
-    return first[0].lower() + first[1:].rstrip(".")
+    """Return the line of the catalogue, or else the first line of the docstring."""
+    doc = inspect.getdoc(_loaded(str(gym.registry[env_id].entry_point))) or ""
+    first = doc.split("\n")[0].rstrip(".")
+    return summaries().get(env_id, first[:1].lower() + first[1:])
 
 
 def _loaded(entry_point: str) -> Any:
     module, _, name = entry_point.partition(":")
     return getattr(importlib.import_module(module), name)
-
-
-# Wiring
 
 
 def wiring_pages() -> Pages:
@@ -179,14 +160,12 @@ def wiring_pages() -> Pages:
     pages["wiring/index.md"] = _page(
         "# Diagrams and parts",
         "A diagram, the pins and the parts of each profile that ships, made from the profiles of "
-        "this version. [Hardware](../hardware.md) says how to build it, and "
-        "[profiles](../profiles.md) what each key means.",
+        "this version. [Hardware](../hardware.md) describes how to build it, and "
+        "[profiles](../profiles.md) the meaning of each key.",
         table(("profile", "robot"), rows),
     )
     return pages
 
-
-# The API reference
 
 _MODULES: Final = """
     layout errors policy contract.testing demos.dataset demos.recording envs.ant
@@ -195,37 +174,30 @@ _MODULES: Final = """
     robot.client.client robot.client.known_robots robot.link.messages robot.twin.operator
     robot.twin.robot transfer.learners.policy_file transfer.study vehicles.remote.waypoints
 """
-"""Modules of the reference besides the packages: they hold public names that no package exports."""
-
-_HIDDEN: Final = ("shapechanger.cli.", "shapechanger.robot.console.")
-"""Packages that are programs: `shapechanger --help` documents the first one."""
+"""Modules of the reference whose public names no package exports."""
 
 
 @cache
 def public_names() -> dict[str, tuple[str, ...]]:
-    """Return the names of each page of the reference, which a package exports or a module has."""
+    """Return the public names of each page of the reference, keyed by package or module."""
     found: dict[str, tuple[str, ...]] = {}
     for path in SRC.glob("shapechanger/**/__init__.py"):
         package = ".".join(path.parent.relative_to(SRC).parts)
-        if not f"{package}.".startswith(_HIDDEN):
-            exported = getattr(importlib.import_module(package), "__all__", ())
-            found |= {package: tuple(exported)} if exported else {}
+        exported = getattr(importlib.import_module(package), "__all__", ())
+        if exported and package != "shapechanger.cli":  # `--help` documents its commands.
+            found[package] = tuple(exported)
     for module in (f"shapechanger.{name}" for name in _MODULES.split()):
         has = vars(importlib.import_module(module))
-        known = has.get("__annotations__", {})
-        found[module] = tuple(
-            name
-            for name, value in has.items()
-            if not name.startswith("_")
-            and (name in known or getattr(value, "__module__", "") == module)
-        )
+        own = {name for name, value in has.items() if getattr(value, "__module__", "") == module}
+        own |= {*has.get("__annotations__", {})}
+        found[module] = tuple(name for name in has if name in own and not name.startswith("_"))
     return dict(sorted(found.items()))
 
 
 def api_pages() -> Pages:
     """Return a page for each public package and module, and their index.
 
-    The innermost page that has a name describes it, and the others link to it.
+    The page of the innermost package or module with a name describes it; others link to it.
     """
     rows: list[tuple[str, ...]] = []
     pages: Pages = {"api/index.md": "", **{f"api/{page}.md": "" for page in public_names()}}
@@ -240,7 +212,7 @@ def api_pages() -> Pages:
                 links.append(f"[`{name}`][{described[key]}]")
             else:
                 members[name] = described[key] = reference_path(page, name)
-        # A module hides what it defines under its own name.
+        # MkDocs does not describe a member that has the name of its module.
         hidden = [path for name, path in members.items() if path.endswith(f".{name}.{name}")]
         pages[f"api/{page}.md"] = _page(
             f"---\ntitle: {page.removeprefix('shapechanger.')}\n---",
@@ -261,6 +233,6 @@ def api_pages() -> Pages:
 
 
 def reference_path(package: str, name: str) -> str:
-    """Return the path by which the reference knows an exported name."""
+    """Return the path under which the reference describes an exported name."""
     module = SRC / package.replace(".", "/") / f"{name}.py"
     return f"{package}.{name}.{name}" if module.exists() else f"{package}.{name}"

@@ -5,15 +5,12 @@ Each lane has its own virtual environment under `build/matrix`:
 - oldest: the lowest allowed version of every direct dependency;
 - newest: the newest allowed versions, without constraints.txt;
 - 3.11 to 3.14: the wheel without the sources, on each of these Pythons that this machine has;
-- robot: the `[robot]` extra alone, like on a Raspberry Pi.
+- robot: only the `[robot]` extra, as on a Raspberry Pi.
 
-`python scripts/test_matrix.py oldest 3.12` runs two of them. Afterwards `dist` holds the source
+`python scripts/test_matrix.py oldest 3.12` runs two lanes. Afterwards `dist` contains the source
 distribution and the wheel that were tested.
 """
 
-from __future__ import annotations
-
-import argparse
 import os
 import shutil
 import subprocess
@@ -30,11 +27,9 @@ UV: Final = (sys.executable, "-m", "uv")
 
 def main() -> int:
     """Run the chosen lanes and report each on a line; the exit status is 1 if one failed."""
-    parser = argparse.ArgumentParser(description="Test other versions and installations.")
-    parser.add_argument("lanes", nargs="*", default=LANES, help=f"some of {', '.join(LANES)}")
-    lanes = parser.parse_args().lanes
+    lanes = sys.argv[1:] or LANES
     if unknown := sorted({*lanes} - {*LANES}):
-        parser.error(f"no lane {unknown[0]!r}; lanes: {', '.join(LANES)}")
+        raise SystemExit(f"There is no lane {unknown[0]!r}; lanes: {', '.join(LANES)}.")
     shutil.rmtree(DIST, ignore_errors=True)
     build = [sys.executable, "-m", "build", "--outdir", str(DIST), str(ROOT)]
     subprocess.run(build, check=True, stdout=subprocess.DEVNULL)
@@ -44,7 +39,7 @@ def main() -> int:
 
 
 def run_lane(lane: str, wheel: Path) -> str:
-    """Install and test a lane, and return how it ended."""
+    """Install and test a lane, and return its result."""
     if lane == "robot":  # This test makes its own environment.
         return _run(sys.executable, "-m", "pytest", "-q", "tests/claims/test_robot_install.py")
     is_wheel = lane in PYTHONS
@@ -63,11 +58,9 @@ def run_lane(lane: str, wheel: Path) -> str:
     installed = _run(*UV, "pip", "install", "--quiet", "--python", python, *options, *package)
     if installed != "passed":
         return installed
-    # The tests run in a copy, so that the wheel cannot find the sources next to them.
     place, chosen = ROOT, "not slow and not system"
-    if is_wheel:
-        chosen += " and not sources"
-        place = folder / "checkout"
+    if is_wheel:  # In a copy without `src`, tests can import only the wheel.
+        place, chosen = folder / "checkout", f"{chosen} and not sources"
         left_out = ("src", "build", "dist", "site", ".venv*", ".git", "results", "__pycache__")
         left_out += (".lgd-nfy*",)  # A pipe of lgpio cannot be copied.
         shutil.copytree(ROOT, place, ignore=shutil.ignore_patterns(*left_out))

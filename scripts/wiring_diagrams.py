@@ -1,16 +1,13 @@
-"""Wiring diagrams, pins and parts of a robot, from its profile.
+"""Wiring diagram, pins and parts of a robot, from its profile.
 
-`python scripts/wiring_diagrams.py my-car.toml --out my-car.svg` draws your own.
+`python scripts/wiring_diagrams.py my-car.toml > my-car.svg` draws the diagram of a profile.
 """
-
-from __future__ import annotations
 
 import argparse
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from html import escape
-from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
 
 import schemdraw
@@ -23,7 +20,7 @@ from shapechanger.robot.profile import Profile, find_profile, load_profile
 _POSITIONS: Final = {pin: position for position, pin in BCM_OF_BOARD.items()}
 _GROUNDS: Final = (6, 9, 14, 20, 25, 30, 34, 39)
 
-# Nets that are drawn as flags and not as wires.
+# Nets, whose names the diagram writes at each terminal.
 GROUND: Final = "GND"
 LOGIC: Final = "3.3 V"
 FIVE: Final = "5 V"
@@ -38,8 +35,8 @@ class Terminal(NamedTuple):
     """One terminal of a device."""
 
     label: str
-    source: int | str  # The BCM pin that a wire leads to, or the flag of a net.
-    pull: str = ""  # Net that a resistor of 10 kOhm leads to, or DIVIDER; "" for none.
+    source: int | str  # The BCM pin that a wire leads to, or the name of a net.
+    pull: str = ""  # Net that a resistor of 10 kOhm leads to, or DIVIDER; "" for no resistor.
 
 
 @dataclass(frozen=True)
@@ -47,11 +44,11 @@ class Device:
     """A board, sensor or switch outside the Pi."""
 
     title: str
-    note: str  # A second line.
-    wires: Mapping[str, int | str]  # Pin or net of each terminal that faces the Pi, by label.
+    note: str  # The second line of its box.
+    wires: Mapping[str, int | str]  # BCM pin or net, keyed by label, of terminals that face the Pi.
     parts: tuple[tuple[str, int, str], ...]  # Name, number and purpose.
-    loads: Mapping[str, str] = field(default_factory=dict[str, str])  # At the other terminals.
-    pulls: Mapping[str, str] = field(default_factory=dict[str, str])  # By label, "" for all pins.
+    loads: Mapping[str, str] = field(default_factory=dict[str, str])  # Loads of other terminals.
+    pulls: Mapping[str, str] = field(default_factory=dict[str, str])  # Keyed by label; "": any pin.
 
     @property
     def terminals(self) -> list[Terminal]:
@@ -76,26 +73,28 @@ def devices_of(profile: Profile) -> list[Device]:
     bridges = [one for one in outputs if one.driver in ("hbridge", "phase_enable")]
     found = [_bridge(bridges[at : at + 2], profile) for at in range(0, len(bridges), 2)]
     if profile.enable_pin is not None:
-        found.append(_one_shot(profile.enable_pin, profile.enable_hold_ms, bool(bridges)))
+        load = ENABLE if bridges else "MOSFET in the motors' supply"
+        found.append(_one_shot(profile.enable_pin, profile.enable_hold_ms, load))
     found += [_direct(one) for one in outputs if one.settings.get("over") in ("lgpio", "sysfs")]
     if profile.stop_pin is not None:
         wires = {"contact": profile.stop_pin, "ground": GROUND}
         parts = (("push button", 1, "emergency stop in the guard"),)
         found.append(Device("Emergency button", "pull-up in the Pi", wires, parts))
     boards: dict[tuple[int, int], list[OutputPlan]] = {}
-    for one in outputs:
-        if one.settings.get("over") == "pca9685":
-            key = one.settings["bus"], one.settings["address"]
-            boards.setdefault(key, []).append(one)
+    for one in (one for one in outputs if one.settings.get("over") == "pca9685"):
+        boards.setdefault((one.settings["bus"], one.settings["address"]), []).append(one)
     found += map(_servo_board, boards.values())
-    found += [device for device in map(_sensor, profile.sensors) if device is not None]
+    found += filter(None, map(_sensor, profile.sensors))
     if servos := [one for one in outputs if one.driver == "bus_servo"]:
         found.append(_servo_bus(servos))
-    if profile.camera is not None and profile.camera.driver in _CAMERAS:
-        cable, part = _CAMERAS[profile.camera.driver]
+    driver = "" if profile.camera is None else profile.camera.driver
+    if driver in ("picamera2", "v4l2"):
+        cable, part = "ribbon cable", "camera on the ribbon cable"
+        if driver == "v4l2":
+            cable, part = "USB", "webcam that sends JPEG"
         found.append(Device("Camera", "", {"cable": cable}, ((part, 1, "camera"),)))
-    speeds = any(one.driver == "esc" for one in outputs)
-    if speeds or any(one.source == MOTORS for device in found for one in device.terminals):
+    has_esc = any(one.driver == "esc" for one in outputs)
+    if has_esc or any(MOTORS in device.wires.values() for device in found):
         plus = BATTERY if any(one.driver == "ina219" for one in profile.sensors) else MOTORS
         parts = (
             ("motor battery, with a fuse", 1, "never the Pi's 5 V"),
@@ -106,51 +105,44 @@ def devices_of(profile: Profile) -> list[Device]:
     return found
 
 
-_CAMERAS: Final = {
-    "picamera2": ("ribbon cable", "camera on the ribbon cable"),
-    "v4l2": ("USB", "webcam that sends JPEG"),
-}
-
-
 def _bridge(outputs: list[OutputPlan], profile: Profile) -> Device:
     """Return an H-bridge board with one or two channels."""
     pins: dict[str, int | str] = {}
-    for number, (channel, output) in enumerate(zip("AB", outputs, strict=False)):
+    for channel, one, two, output in zip("AB", "13", "24", outputs, strict=False):
         has = output.settings
         if output.driver == "hbridge":
-            pins |= {f"IN{2 * number + 1}": has["forward"], f"IN{2 * number + 2}": has["backward"]}
+            pins |= {f"IN{one}": has["forward"], f"IN{two}": has["backward"]}
         else:
             pins[f"PH{channel}"] = has["phase"]
         pins[f"EN{channel}"] = has.get("enable", NO_PIN)
-    wired = any(pins.get(f"EN{channel}", NO_PIN) != NO_PIN for channel in "AB")
-    if not wired:
+    is_wired = any(one.settings.get("enable", NO_PIN) != NO_PIN for one in outputs)
+    if not is_wired:
         pins["enable"] = LOGIC if profile.enable_pin is None else ENABLE
-    note = "enable AND one-shot" if wired and profile.enable_pin is not None else ""
+    note = "enable AND one-shot" if is_wired and profile.enable_pin is not None else ""
     parts = (
         ("H-bridge board, two channels (TB6612FNG, DRV8833; L298N above 6 V)", 1, "motors"),
         ("DC motor", len(outputs), ", ".join(one.part or one.name for one in outputs)),
     )
     loads = {f"OUT {'AB'[at]}": f"motor ({one.name})" for at, one in enumerate(outputs)}
-    wires = {**pins, "VM": MOTORS, "GND": GROUND}
-    return Device("H-bridge", note, wires, parts, loads, {"": GROUND})
+    pins |= {"VM": MOTORS, "GND": GROUND}
+    return Device("H-bridge", note, pins, parts, loads, {"": GROUND})
 
 
 # K of t = K R C at 1 uF, ms per kOhm; docs/hardware.md gives its source.
 _HOLD_OF_KOHM_MS: Final = 0.45
 
 
-def _one_shot(pin: int, hold_ms: int, for_bridges: bool) -> Device:
+def _one_shot(pin: int, hold_ms: int, load: str) -> Device:
     resistor = f"{float(f'{hold_ms / _HOLD_OF_KOHM_MS:.2g}'):g}"
-    timing = {"2RCext": f"{resistor} kΩ to {LOGIC}", "2Cext": "1 µF to 2RCext"}
-    wires = {"2B": pin, "2A": GROUND, "2RD": LOGIC, **timing}
+    wires = {"2B": pin, "2A": GROUND, "2RD": LOGIC, "2RCext": f"{resistor} kΩ to {LOGIC}"}
+    wires["2Cext"] = "1 µF to 2RCext"
     parts = (
         ("74HC123", 1, "one-shot in the enable line"),
         (f"resistor {resistor} kOhm", 1, f"its time: {hold_ms} ms"),
         ("film or ceramic capacitor 1 uF", 1, "its time"),
     )
-    loads = {"2Q": ENABLE if for_bridges else "MOSFET in the motors' supply"}
     note = f"drops after {hold_ms} ms"
-    return Device("One-shot 74HC123", note, wires, parts, loads, {"": GROUND})
+    return Device("One-shot 74HC123", note, wires, parts, {"2Q": load}, {"": GROUND})
 
 
 _ESC: Final = "speed controller (ESC) with its motor"
@@ -161,13 +153,12 @@ def _direct(output: OutputPlan) -> Device:
     name, settings = output.name, output.settings
     by_pin = settings["over"] == "lgpio"
     source = settings["pin"] if by_pin else f"PWM {settings['chip']}.{settings['channel']}"
-    title, note, part = f"Servo ({name})", "V+ not from the Pi", "servo"
-    power, loads = {"V+": "5 to 6 V"}, {}
-    if output.driver == "esc":
-        title, note, part = f"ESC ({name})", "BEC powers the servos", _ESC
-        power, loads = {"battery +": MOTORS}, {"motor wires": f"motor ({name})"}
-    wires = {"signal": source, **power, "GND": GROUND}
-    return Device(title, note, wires, ((part, 1, name),), loads, {"": GROUND})
+    if output.driver != "esc":
+        wires, parts = {"signal": source, "V+": "5 to 6 V", "GND": GROUND}, (("servo", 1, name),)
+        return Device(f"Servo ({name})", "V+ not from the Pi", wires, parts, pulls={"": GROUND})
+    wires, parts = {"signal": source, "battery +": MOTORS, "GND": GROUND}, ((_ESC, 1, name),)
+    loads = {"motor wires": f"motor ({name})"}
+    return Device(f"ESC ({name})", "BEC powers the servos", wires, parts, loads, {"": GROUND})
 
 
 def _servo_board(outputs: list[OutputPlan]) -> Device:
@@ -182,14 +173,12 @@ def _servo_board(outputs: list[OutputPlan]) -> Device:
         ("servo", len(outputs) - len(motors), "its channels"),
         ("servo supply, 5 to 6 V", int(not motors), "V+ of the board"),
     )
-    texts = {"esc": "ESC ({}), + V MOTOR"}
-    loads = {
-        str(one.settings["channel"]): texts.get(one.driver, "servo ({})").format(one.name)
-        for one in outputs
-    }
-    return Device(
-        "PCA9685", f"address {settings['address']:#x}", wires, parts, loads, {"OE": LOGIC}
-    )
+    loads: dict[str, str] = {}
+    for one in outputs:
+        text = f"ESC ({one.name}), + V MOTOR" if one.driver == "esc" else f"servo ({one.name})"
+        loads[str(one.settings["channel"])] = text
+    note = f"address {settings['address']:#x}"
+    return Device("PCA9685", note, wires, parts, loads, {"OE": LOGIC})
 
 
 def _servo_bus(servos: list[OutputPlan]) -> Device:
@@ -238,9 +227,6 @@ def _sensor(sensor: SensorPlan) -> Device | None:
             return None
 
 
-# Tables
-
-
 def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     """Return a table in Markdown; its cells may hold any text."""
     titles = list(head)
@@ -248,12 +234,8 @@ def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in (titles, ["---"] * len(titles), *lines))
 
 
-_RESISTORS: Final = {
-    "": "",
-    GROUND: ", 10 kOhm to ground",
-    LOGIC: f", 10 kOhm to {LOGIC}",
-    DIVIDER: ", through 1 kOhm, and 2 kOhm from the pin to ground",
-}
+_RESISTORS: Final = {"": "", GROUND: ", 10 kOhm to ground", LOGIC: f", 10 kOhm to {LOGIC}"}
+_RESISTORS[DIVIDER] = ", through 1 kOhm, and 2 kOhm from the pin to ground"
 
 
 def pin_table(profile: Profile) -> str:
@@ -273,19 +255,15 @@ def pin_table(profile: Profile) -> str:
 
 def part_list(profile: Profile) -> str:
     """Return a Markdown table of the parts of a robot."""
-    found = devices_of(profile)
-    pulls = [wire.pull for device in found for wire in device.terminals if wire.pull]
-    divided = pulls.count(DIVIDER)
-    parts = (
-        ("Raspberry Pi 3B+ or newer, with its own supply", 1, "computer"),
-        *(part for device in found for part in device.parts),
-        ("resistor 1 kOhm", divided, "divider of the echo"),
-        ("resistor 2 kOhm", divided, "divider of the echo"),
-        ("resistor 10 kOhm", len(pulls) - divided, "outputs are off until the guard runs"),
-    )
-    counts: Counter[tuple[str, str]] = Counter()
-    for name, number, purpose in parts:
+    counts = Counter({("Raspberry Pi 3B+ or newer, with its own supply", "computer"): 1})
+    devices = devices_of(profile)
+    for name, number, purpose in (part for device in devices for part in device.parts):
         counts[name, purpose] += number
+    pulls = [wire.pull for device in devices for wire in device.terminals if wire.pull]
+    divided = pulls.count(DIVIDER)
+    counts["resistor 1 kOhm", "divider of the echo"] = divided
+    counts["resistor 2 kOhm", "divider of the echo"] = divided
+    counts["resistor 10 kOhm", "outputs are off until the guard runs"] = len(pulls) - divided
     rows = [(name, count, purpose) for (name, purpose), count in counts.items() if count]
     return table(("part", "number", "for"), rows)
 
@@ -297,20 +275,15 @@ _BOX_WIDTH: Final = 5.4
 _ROW: Final = 1.0
 _TITLE: Final = 1.4
 _WIRE: Final = 2.6
-_INK: Final = "black"  # The page's colour takes its place.
+_INK: Final = "black"  # Replaced by the colour of the page's text.
 _NETS_OF_HEADER: Final = {1: LOGIC, 17: LOGIC, 2: FIVE, 4: FIVE} | dict.fromkeys(_GROUNDS, "GND")
 
 
 def draw_wiring(profile: Profile, name: str) -> str:
-    """Return the wiring of a robot as an SVG element.
-
-    Args:
-        profile: The profile.
-        name: What the image is called.
-    """
+    """Return the wiring of a robot as an SVG element; its label contains `name`."""
     schemdraw.use("svg")
     devices = devices_of(profile)
-    sources = [wire.source for device in devices for wire in device.terminals]
+    sources = {wire.source for device in devices for wire in device.terminals}
     pins = [source for source in sources if isinstance(source, int)]
     drawing = schemdraw.Drawing(
         show=False, fontsize=10, font="sans-serif", color=_INK, lw=1.3, margin=1.0
@@ -363,15 +336,8 @@ def _draw_device(drawing: schemdraw.Drawing, device: Device, top: float) -> floa
     return bottom - _ROW
 
 
-def main() -> None:
-    """Write the diagram of a profile."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("profile", help="name or path of a profile")
-    parser.add_argument("--out", type=Path, required=True, help="the SVG to write")
-    asked = parser.parse_args()
-    path = find_profile(asked.profile)
-    asked.out.write_text(draw_wiring(load_profile(path), path.stem) + "\n")
-
-
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description="Print the wiring diagram of a robot, as SVG.")
+    parser.add_argument("profile", help="name or path of a profile")
+    path = find_profile(parser.parse_args().profile)
+    print(draw_wiring(load_profile(path), path.stem))
