@@ -20,7 +20,7 @@ METRES: Final = 30.0
 """Length of a drive, m."""
 
 LIMIT_S: Final = 120.0
-"""Longest time for it, s; a tank at a quarter of its top speed gets there."""
+"""Time limit of a drive, s, in which a tank drives 30 m at a quarter of its top speed."""
 
 _PER_M: Final = 100.0  # Collisions are reported per 100 m.
 
@@ -34,8 +34,8 @@ class DriveResult:
         metres: Net progress along the course, m; driving backward subtracts.
         seconds: Duration in the vehicle's time, s.
         collisions: Number of collisions.
-        reached: Whether it reached the required distance.
-        standing: Share of the time in which it stood still.
+        reached: Whether the vehicle reached the required distance.
+        standing: Share of the time in which the vehicle stood still.
     """
 
     course: int
@@ -105,15 +105,15 @@ class DriveScore:
     Attributes:
         drives: Number of drives.
         metres: Total net progress, m.
-        speed: Mean speed, all metres over all seconds, m/s.
+        speed: Mean speed, all metres divided by all seconds, m/s.
         slowest: Mean speed of the slowest drive, m/s.
         fastest: Mean speed of the fastest drive, m/s.
         collisions: Total number of collisions.
         per_100_m: Collisions per 100 m of net progress; infinite without any progress.
         low: Lower bound of the collisions per 100 m, with 95 % confidence.
-        high: Upper bound of the same.
+        high: Upper bound of the collisions per 100 m, with 95 % confidence.
         reached: Share of drives that reached the required distance.
-        standing: Share of the time in which it stood still.
+        standing: Share of the time in which the vehicle stood still.
     """
 
     drives: int
@@ -133,7 +133,7 @@ class DriveScore:
         """Summarise drives.
 
         Raises:
-            WorldError: If no course is left.
+            WorldError: If there are no drives.
         """
         if not drives:
             raise WorldError("There is no drive to score: give at least one.")
@@ -168,7 +168,7 @@ def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float
 
     Args:
         count: The count, >= 0.
-        confidence: Probability that the interval contains the mean, at least.
+        confidence: Least probability that the interval contains the mean.
     """
     rest = (1.0 - confidence) / 2.0
     low = float(chi2.ppf(rest, 2 * count)) / 2.0 if count else 0.0

@@ -1,7 +1,7 @@
 """Daemon with a simulated guard and camera of negligible cost, to measure the link alone.
 
 A new image is always available, so each command is answered at once with an observation that
-carries one, like on a robot whose camera is faster than its client.
+has an image, as on a robot whose camera is faster than its client.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ _MILD: Final = 0.5
 _RECOVERED: Final = 0.8
 _RECOVERED_IN_GAP: Final = 0.9
 _TUNED: Final = 0.7
-# A mean over fingers hides the weak ones, so each row also counts the fingers from this share on.
+# A mean over fingers hides weak ones, so each row also counts the fingers with at least this share.
 _STRONG: Final = 0.8
 _FOLLOWED: Final = 2.0
 # Time that the whole command may take for a finger, min.
@@ -101,7 +101,7 @@ def gap() -> list[Row]:
 def _arms(
     target: EnvRef, out: Path, fingers: int, simulated: int
 ) -> tuple[Plan, dict[str, list[RunResult]]]:
-    """Run the arms that are asked for, and return the plan and the runs that have ended, by arm.
+    """Run the requested arms, and return the plan and the runs that have ended, keyed by arm.
 
     Args:
         target: Env of the target fingers.
@@ -167,7 +167,7 @@ def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
             inner: Any = env.unwrapped
             parameters: FingerParameters = inner.parameters
             targets = [
-                env.reset(seed=first[seed] + i)[1]["target"]  # As in the runs.
+                env.reset(seed=first[seed] + i)[1]["target"]  # The targets of the runs.
                 for i in range(TARGETS)
             ]
         statics = Statics(parameters)
@@ -202,7 +202,7 @@ def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
 
 
 def _row(name: str, shares: Mapping[int, float]) -> Row:
-    """Return a row of shares of the targets by the seed of the finger.
+    """Return a row of the shares of reached targets, keyed by the seed of the finger.
 
     A row of some fingers names their seeds, so that it does not replace the row of the first ones.
     """
@@ -247,7 +247,7 @@ def _chatter_rows(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
 
 
 def rig() -> list[Row]:
-    """Measure the same through link, daemon, guard and servo bus; see `gap` for the variables."""
+    """Measure what `gap` does through link, daemon, guard and servo bus; variables as in `gap`."""
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
     out = Path("results", "finger-rig")
     plan, runs = _arms(target, out, RIGS, RIG_SIMULATED)
@@ -288,11 +288,11 @@ def command() -> list[Row]:
 
 
 def follow() -> list[Row]:
-    """Measure how closely a circle is followed on twins of a rig, by policies that never saw one.
+    """Measure how closely policies that never saw a circle follow one on twins of a rig.
 
-    Each policy learns other paths in the finger that was identified on its rig. The same policy on
-    the circle in that simulated finger is the reference: a finger drawn from the gap in process has
-    other motors and delays than the rig's servos.
+    Each policy learns other paths in the finger that was identified on its rig. The reference is
+    the same policy on the circle in that simulated finger, because a finger that is drawn from the
+    gap has other motors and delays than the rig's servos.
     """
     source = EnvRef("shapechanger/FingerTrack-v1", {"path": "random"})
     circle = {"path": CIRCLE}
@@ -372,7 +372,7 @@ def _run(plan: Plan, out: Path, *, policy: Shipped = "reach") -> None:
 
 
 def _ended(plan: Plan, out: Path) -> dict[str, list[RunResult]]:
-    """Return the runs that have ended, by arm; an arm without any is left out."""
+    """Return the runs that have ended, keyed by arm; arms without such runs are left out."""
     runs = {
         arm: [load_result(plan, out, Run(arm, index)) for index in range(plan.seeds)]
         for arm in plan.arms
@@ -384,12 +384,12 @@ def _ended(plan: Plan, out: Path) -> dict[str, list[RunResult]]:
 def rows_of(
     runs: Mapping[str, list[RunResult]], where: str, least: Mapping[str, float], simulated: int
 ) -> list[Row]:
-    """Return the success of each arm at its end next to its target; the nominal finger reaches all.
+    """Return rows of the final success of each arm; in the nominal finger it would be 100 %.
 
     Args:
-        runs: The runs by arm.
-        where: Its targets, in words.
-        least: Least mean success of an arm, where one is asked.
+        runs: The runs, keyed by arm.
+        where: Name of the target envs, for the rows.
+        least: Required mean success, keyed by arm; other arms have no requirement.
         simulated: Steps of arms that learn in simulated fingers.
     """
     rows: list[Row] = []

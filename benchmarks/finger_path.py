@@ -34,7 +34,7 @@ _LAG_S = 0.002
 
 
 def path() -> list[Row]:
-    """Identify twins of a rig, and replay on them what the shipped policy did there.
+    """Identify twins of a rig, and replay commands of the shipped policy in the identified fingers.
 
     The policy was trained without a path, and chatters.
     """
@@ -51,7 +51,7 @@ def path() -> list[Row]:
         )
         babble = record_babble(env, _SECONDS, 100 + seed)
         logs = [_played(env, _FIRST_SEED + i) for i in range(_EPISODES)]
-        env.close()  # A twin does not wait for an identification.
+        env.close()  # The identification takes longer than a twin in real time would wait.
         found = identify(babble).parameters
         delays.append(found.command_delay)
         chatter += [float(np.abs(np.diff(log.commands, axis=0)).mean()) for log in logs]
@@ -100,8 +100,8 @@ def _played(env: gym.Env[Any, Any], seed: int) -> FingerLog:
     places = unwrapped.observation_layout.slices
     rows = np.array(seen)
 
-    def columns(what: str) -> NDArray[np.float64]:
-        return rows[:, [at.start for name, at in places.items() if name.endswith(f"/{what}")]]
+    def columns(quantity: str) -> NDArray[np.float64]:
+        return rows[:, [at.start for name, at in places.items() if name.endswith(f"/{quantity}")]]
 
     return FingerLog(
         t=np.asarray(CONTROL_DT * np.arange(len(rows)), np.float64),

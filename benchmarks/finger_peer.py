@@ -2,7 +2,7 @@
 
 KIND is `ours` or `myosuite`. The process prints `ready`, its version and the duration of a step, s.
 For each number of steps that it reads, it prints the CPU seconds they took, resets included. It
-imports none of our other modules, so that the peer can live in another environment.
+imports none of our other modules, so that it can run in another Python environment.
 """
 
 from __future__ import annotations

@@ -65,7 +65,7 @@ def physics() -> list[Row]:
 
 
 def _end_off(seed: int) -> float:
-    """Return how far the end joint is from where the middle one puts it, rad."""
+    """Return the deviation of the end joint from `DIP_BY_PIP` times the middle joint, rad."""
     model = build_finger(NOMINAL, drive_of("impedance", NOMINAL)).compile()
     data = mujoco.MjData(model)
     data.qpos[:] = JOINT_REST
@@ -78,7 +78,7 @@ def _stiffness(level: float) -> NDArray[np.float64]:
     """Return the active stiffness of each joint at rest, N·m/rad, (4,).
 
     Args:
-        level: Multiple of the smallest tensions, at least 1 N each, that have no torque.
+        level: Multiple of the smallest tensions, at least 1 N each, that produce no torque.
     """
     drive = drive_of("impedance", NOMINAL)
     model = build_finger(NOMINAL, drive).compile()

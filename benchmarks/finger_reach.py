@@ -83,18 +83,18 @@ class Statics:
         """Return the distance of the nearest equilibrium without friction, m.
 
         Args:
-            target: Place of the fingertip, m, (3,).
+            target: Position of the fingertip, m, (3,).
         """
         return self._nearest(target, self._low, self._high)[0]
 
     def distance_coming_from_rest(self, target: NDArray[np.float64]) -> float:
-        """Return the distance of the nearest place that a motion from the rest posture ends at, m.
+        """Return the distance of the nearest point at which a motion from the rest posture ends, m.
 
         Friction reduces the pull of a shortening tendon, and increases the pull of a lengthening
-        one holds.
+        one.
 
         Args:
-            target: Place of the fingertip, m, (3,).
+            target: Position of the fingertip, m, (3,).
         """
         distance, angles = self._nearest(target, self._low, self._high)
         for _ in range(2):  # Which tendons shorten, and so lose force, depends on the result.
@@ -152,9 +152,9 @@ class Statics:
 
 
 def causes() -> list[Row]:
-    """Measure what keeps the controller that knows a finger of the gap from its targets.
+    """Measure which parameters keep a controller with a model of the finger from its targets.
 
-    Each row replaces some parameters of the fingers.
+    For each row, some parameters of the fingers are replaced.
     """
     many = int(os.environ.get("FINGERS", FINGERS))
     fingers = [_RIG.draw(np.random.default_rng(seed)) for seed in range(many)]
@@ -179,10 +179,10 @@ def causes() -> list[Row]:
 
 
 def held_by_controller(finger: FingerParameters, first_seed: int, targets: int) -> list[bool]:
-    """Return whether the controller that knows the finger reaches and holds each target.
+    """Return whether a controller with a model of the finger reaches and holds each target.
 
     Args:
-        finger: Its parameters.
+        finger: Parameters of the finger.
         first_seed: Seed of the first episode.
         targets: Number of episodes.
     """

@@ -154,8 +154,8 @@ def fuzz(
     """Send mutated messages to unauthenticated sessions and to sessions without the lease.
 
     Returns:
-        Number of messages that ended the connection, of decoded messages, and of orders that
-        reached the guard by kind.
+        Number of messages that ended the connection, of decoded messages, and of orders of each
+        kind that reached the guard.
 
     Raises:
         AssertionError: If a command was accepted, or a session authenticated.
@@ -203,7 +203,7 @@ def fuzz(
         if number % 50_000 < 4:
             progress(number)
     if hub.holder is not owner.client:
-        raise AssertionError("The owner lost the command.")
+        raise AssertionError("The owner lost control of the robot.")
     return counts
 
 

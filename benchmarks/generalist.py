@@ -56,11 +56,11 @@ class Scores(msgspec.Struct, frozen=True):
     """Forward speed of one policy in each body, m/s.
 
     Attributes:
-        network: Its network.
+        network: Kind of the policy's network.
         seed: Seed of its training.
-        splits: Speeds by split and `AGAIN`, one for each body.
+        splits: Speed in each body, keyed by split or `AGAIN`.
         extended: Speed in the extended ant.
-        command: The command that measured it.
+        command: The command that measured the speeds.
     """
 
     network: str
@@ -130,9 +130,9 @@ def _speed(speeds: _Floats) -> str:
 
 
 def _improvement(one: _Floats, other: _Floats) -> tuple[float, float, float]:
-    """Return the probability that a policy of one is faster than of the other in a body.
+    """Return the probability that a policy of `one` is faster than a policy of `other` in a body.
 
-    A policy is judged in all bodies, so the bootstrap draws policies and bodies, not their pairs.
+    Policies are evaluated in all bodies, so the bootstrap draws policies and bodies, not pairs.
 
     Args:
         one: Speeds, shape (seeds, bodies).
@@ -154,7 +154,7 @@ def _improvement(one: _Floats, other: _Floats) -> tuple[float, float, float]:
 
 
 def _judged(network: Network, seed: int) -> Scores:
-    """Train a policy unless it is there, and measure its speed in every body."""
+    """Train a policy unless its file exists, and measure its speed in every body."""
     use_one_thread()
     file, result = (OUT / f"{network}-{seed}.{kind}" for kind in ("safetensors", "json"))
     if result.exists():
@@ -179,7 +179,7 @@ def _scores(network: str, seed: int, file: Path) -> Scores:
 
 
 def of_gpu() -> list[Row]:
-    """Judge the policy that the trial of a GPU trained in many ants."""
+    """Evaluate the policy that `gpu-generalist` trained in many ants."""
     file = Path("benchmarks", "results", "generalist-gpu.safetensors")
     card = load_policy(file).card
     scores = _scores("limbs", card.seed, file)
@@ -226,7 +226,7 @@ def _speed_in(file: Path, body: EnvRef) -> float:
 
 
 def _scratch(split: str) -> list[float]:
-    """Return the speed of a policy of limbs that learned in each of some bodies alone, m/s."""
+    """Return the speeds of policies of limbs, each of which learned in one body only, m/s."""
     use_one_thread()
     result = OUT / f"scratch-{split}.json"
     if result.exists():
@@ -248,7 +248,7 @@ def _scratch(split: str) -> list[float]:
 
 
 def _scratch_row(found: list[Scores], split: str, alone: list[float]) -> Row:
-    """Return the speed of policies that learn in one body each, with that body's share of steps."""
+    """Compare policies that learn in one body, with that body's share of steps, with zero-shot."""
     limbs = np.array(
         [one.splits[split][:SCRATCH_BODIES] for one in found if one.network == "limbs"]
     )

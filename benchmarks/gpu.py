@@ -42,7 +42,7 @@ from shapechanger.transfer.learners.presets import learner_settings
 
 GPU: Final = torch.cuda.is_available()
 DEVICE: Final = "cuda:0" if GPU else "cpu"
-# Worlds of the speed on a GPU, and of the ratios on a CPU.
+# Number of worlds for speeds on a GPU, and for ratios on a CPU.
 MANY: Final = 8192
 FEW: Final = 64
 STEPS: Final = 100
@@ -103,20 +103,20 @@ def _there() -> bool:
 
 def _all(*parts: Callable[[], Iterator[Row]]) -> Iterator[Row]:
     if GPU:
-        wp.config.cuda_output = "cubin"  # As `benchmarks.gpu_kernels` writes them.
+        wp.config.cuda_output = "cubin"  # `benchmarks.gpu_kernels` compiles such files.
     for part in parts:
         began = time.monotonic()
         try:
             yield from part()
         except Exception as error:
-            # The machine may be lent for minutes, and the other parts do not depend on this one.
+            # The other parts do not depend on this one.
             traceback.print_exc()
             yield Row(part.__name__, "failed", f"{type(error).__name__}: {error}", "none", False)
         sys.stderr.write(f"{part.__name__} took {time.monotonic() - began:.0f} s.\n")
 
 
 def _card() -> str:
-    """Return the name of the GPU, or that it is a CPU."""
+    """Return the name of the device."""
     return torch.cuda.get_device_name() if GPU else "Warp's CPU device"
 
 
@@ -160,7 +160,7 @@ def _ratio(one: Callable[[], object], other: Callable[[], object], repeats: int)
 
 
 def _stepper(envs: Any, several: list[Any]) -> Callable[[], object]:
-    """Return a function that takes a step with the next of some actions, again and again."""
+    """Return a function whose calls take steps with some actions in turn."""
     place = [0]
 
     def step() -> object:
@@ -226,7 +226,7 @@ def speed() -> Iterator[Row]:
 
 
 def waiting() -> Iterator[Row]:
-    """Count how often a step waits for the GPU, by CUDA's own account."""
+    """Count how often a step waits for the GPU, from CUDA's warnings."""
     name = "Ant: questions to the GPU in a step"
     envs = made("Ant", FEW)
     step = _stepper(envs, actions(envs, 5))
@@ -264,7 +264,7 @@ def graphs() -> Iterator[Row]:
 
 
 def construction() -> Iterator[Row]:
-    """Measure the time in which a vector env of many equal ants is made."""
+    """Measure the time to make a vector env of many equal ants."""
     made("Ant", 2).close()
     times = sorted(
         _seconds(lambda: shapechanger.make_vec("Ant", MANY, backend="warp", device=DEVICE), 1)
@@ -280,7 +280,7 @@ def construction() -> Iterator[Row]:
 
 
 def differing() -> Iterator[Row]:
-    """Compare ants with other legs each, and ants that draw from a pool, with equal ants."""
+    """Compare ants with different legs, and ants that are drawn from a pool, with equal ants."""
     count = MANY if GPU else FEW
     bodies = [[Stretch("shank_*", 0.8 + 0.4 * i / 63)] for i in range(FEW)]
     # The body in the middle, so that both sides touch the floor equally often.
@@ -307,7 +307,7 @@ def differing() -> Iterator[Row]:
 
 
 def batches() -> Iterator[Row]:
-    """Compare a step of ants of several shapes with the steps of each shape after another."""
+    """Compare a step of ants of several shapes with steps of one shape after another."""
     drawn = ANT.having({"bodies": GENERALIST_BODIES | {"count": 32}})
     bodies = [body.kwargs["body"] for body in each_body(drawn)]
     count = MANY // 2 if GPU else FEW
@@ -343,11 +343,11 @@ def _trained(
     steps: int,
     on_steps: Callable[[int], object] = lambda done: None,
 ) -> tuple[TrainedPolicy, float, list[float]]:
-    """Train a policy; return it, the seconds of it, and forward speeds before and after.
+    """Train a policy; return it, its training time, s, and forward speeds before and after.
 
-    The seconds contain the evaluation at the end, on a CPU env.
+    The time includes the evaluation at the end, on a CPU env.
     """
-    # It needs rsl-rl, which other parts do not.
+    # This import needs rsl-rl, which other parts do not need.
     from shapechanger.transfer.runs import learner_of
 
     times: list[float] = []
@@ -366,7 +366,7 @@ def _trained(
 
 
 def training() -> Iterator[Row]:
-    """Measure a training with PPO, and what it has learned."""
+    """Measure the time of a training with PPO, and the speed of its policy."""
     name = f"Ant: seconds of PPO with rsl-rl for {TRAINING:,} steps on a GPU"
     target = f"< {LONGEST_S}"
     # Compile the kernels first.

@@ -55,7 +55,7 @@ def launched() -> set[tuple[Any, int]]:
         gpu.rollouts("cpu")
         envs = gpu.made("Ant", 4, "cpu", pool=["Ant", [Stretch("shank_*", 1.1)]])
         envs.step(gpu.actions(envs, 1)[0])
-        # Drawn ants have other numbers of joints.
+        # Drawn ants differ in their number of joints.
         drawn = each_body(gpu.ANT.having({"bodies": gpu.GENERALIST_BODIES}))
         envs = gpu.made("Ant", len(drawn), "cpu", **together(drawn).kwargs)
         envs.step([torch.zeros(space.shape) for space in envs.action_space])

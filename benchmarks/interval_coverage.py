@@ -17,7 +17,7 @@ from shapechanger.transfer.metrics.intervals import estimate_ratio
 Array = NDArray[np.float64]
 
 N_RESAMPLES = 2000
-# True means over seeds, of scores.
+# True mean scores of the two arms.
 ARM, SCRATCH = 0.8, 0.5
 
 
@@ -26,7 +26,7 @@ class Case(NamedTuple):
 
     Attributes:
         data: Distribution of the areas of single seeds.
-        spread: Standard deviation over mean, in percent.
+        spread: Standard deviation divided by the mean, in percent.
         n_seeds: Seeds in each of the two arms.
     """
 
@@ -39,7 +39,7 @@ class Measured(NamedTuple):
     """Result of one method over all studies of a case.
 
     Attributes:
-        coverage: Share of the intervals that contain the true value; a missing one counts.
+        coverage: Share of the intervals that contain the true value; missing intervals count too.
         width: Median width; a missing interval has infinite width.
     """
 
@@ -76,7 +76,7 @@ def draw(case: Case, trials: int, rng: np.random.Generator) -> tuple[Array, Arra
         return rng.lognormal(np.log(mean) - square / 2.0, np.sqrt(square), shape)
 
     def failures(mean: float) -> Array:
-        """Areas of which one in five is a tenth of the others."""
+        """Return areas, one in five of which is a tenth of the others."""
         failed = rng.random(shape) < 0.2
         return np.where(failed, 0.1 * mean, rng.normal(mean, spread * mean, shape))
 
@@ -99,12 +99,12 @@ def draw(case: Case, trials: int, rng: np.random.Generator) -> tuple[Array, Arra
 
 
 def quotient(arms: Array, scratches: Array, axis: int) -> Array:
-    """Ratio of means."""
+    """Return the ratio of the means."""
     return np.asarray(arms.mean(axis=axis) / scratches.mean(axis=axis))
 
 
 def bca(arms: Array, scratches: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Bias-corrected and accelerated bootstrap (Efron, JASA 82, 1987)."""
+    """Return intervals of the bias-corrected and accelerated bootstrap (Efron, JASA 82, 1987)."""
     interval = stats.bootstrap(
         (arms, scratches),
         quotient,
@@ -118,7 +118,7 @@ def bca(arms: Array, scratches: Array, rng: np.random.Generator) -> tuple[Array,
 
 
 def studentised(arms: Array, scratches: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """The package's interval; NaN without one."""
+    """Return the intervals of the package; NaN if there is no interval."""
     estimates = [
         estimate_ratio(a, b, least=1e-9, too_small="-", rng=rng, n_resamples=N_RESAMPLES)
         for a, b in zip(arms, scratches, strict=True)
@@ -129,9 +129,9 @@ def studentised(arms: Array, scratches: Array, rng: np.random.Generator) -> tupl
 
 
 def fieller(arms: Array, scratches: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """All r with |x - r y| <= t · sqrt(v_x + r² v_y) (Fieller, JRSS B 16, 1954).
+    """Return the bounds of all r with |x - r y| <= t · sqrt(v_x + r² v_y).
 
-    With Welch's degrees of freedom at the estimate; NaN where the set is not an interval.
+    Fieller, JRSS B 16, 1954, with Welch's degrees of freedom; NaN if the set is not an interval.
     """
     n, m = arms.shape[1], scratches.shape[1]
     x, y = arms.mean(axis=1), scratches.mean(axis=1)

@@ -142,13 +142,13 @@ def _changed(original: ast.FunctionDef, mutant: ast.FunctionDef) -> str:
 
 
 def _noticeable(function: ast.FunctionDef) -> str:
-    """Return the body of a function without what no test looks at."""
+    """Return the body of a function without the parts that tests need not check."""
     body = ast.parse("\n".join(ast.unparse(one) for one in function.body))
     return ast.dump(_Noticeable().visit(body))
 
 
 class _Noticeable(ast.NodeTransformer):
-    """Remove the texts of errors, types for checkers, and refusals of a caller's own mistakes."""
+    """Remove the texts of errors, types for checkers, and `strict` of `zip`."""
 
     def visit_Raise(self, node: ast.Raise) -> ast.Raise:
         for text in (one for one in ast.walk(node) if isinstance(one, ast.Constant)):

@@ -1,4 +1,4 @@
-"""Process to measure, possibly of another environment."""
+"""Process to measure, possibly in another Python environment."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Peer:
             if words[:1] == ["ready"]:
                 return words[1:]
         lines = self._process.stderr.read().strip().splitlines()
-        raise RuntimeError(lines[-1] if lines else "it ended without a word")
+        raise RuntimeError(lines[-1] if lines else "it ended without output")
 
     def begin(self, steps: int) -> None:
         """Request a number of steps."""

@@ -1,7 +1,7 @@
-"""Reference policies: each env trained from scratch with its own settings, and its floor.
+"""Train reference policies of each env from scratch, and measure its floor: scores without skill.
 
 Policies and curves are kept in `results/references`; finished trainings are not repeated and always
-count, as do the sources of the suite of ants. `ONLY` names envs, `SEEDS` sets the least number of
+count, as do the sources of the suite of ants. `ONLY` names envs, and `SEEDS` limits the number of
 trainings of each. The values and the best policy of each env are written into the package.
 """
 
@@ -100,7 +100,7 @@ def references() -> list[Row]:
 
 
 def _seeds(name: str, most: int) -> int:
-    """Return the number of trainings of an env: as many as requested, or as exist if more."""
+    """Return the number of trainings of an env: the requested number, or all finished if more."""
     done = 0
     while (RESULTS / f"{name}-{done}.json").exists():
         done += 1

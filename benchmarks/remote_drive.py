@@ -27,7 +27,7 @@ def drive_remote(
         operator: Operator that puts the robot at the start, and back after a collision.
         act: Driver.
         course: Seed of the course, which must be laid out already.
-        start: Seed of the start on it; None for the course's.
+        start: Seed of the start on the course; None for the seed of the course.
         metres: Distance to drive, net along the course, m.
         limit_s: Time limit, s.
 

@@ -32,11 +32,11 @@ def asked(kind: str, names: Iterable[str]) -> list[str]:
     """Return the names in `ONLY`, which are separated by spaces, or all if it is not set.
 
     Args:
-        kind: What they are names of, for the message.
+        kind: Kind of the names, for the error message.
         names: All names.
 
     Raises:
-        UnknownName: If no row has this name.
+        UnknownName: If `ONLY` contains an unknown name.
     """
     known = list(names)
     found = os.environ.get("ONLY", "").split() or known

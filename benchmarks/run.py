@@ -180,7 +180,7 @@ def main() -> None:
                 # After each row, so that a run that is cut off keeps its results.
                 rows.append(row)
                 _write(name, rows, former)
-        except UnknownName as error:  # In `ONLY`.
+        except UnknownName as error:  # `ONLY` contains an unknown name.
             sys.exit(str(error))
     Console().print(table)
 

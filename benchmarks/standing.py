@@ -35,11 +35,11 @@ from shapechanger.vehicles.envs.ranges import observe_ranges
 OUT: Final = Path("results", "standing")
 SEEDS: Final = 3
 STARTS: Final = 100
-# Offsets from a start on the lane: sideways and along, m, and of the heading, rad.
+# Largest offsets of a start from the lane: of the position along each axis, m, and of the heading.
 ASIDE_M: Final = 0.3
 TURNED_RAD: Final = 1.2
 STEPS: Final = 160
-# A vehicle that has stood for this long at the end stands for good.
+# A vehicle stands for good if it has stood for this many steps at the end.
 FOR_GOOD: Final = 80
 PROGRESS_M: Final = 0.5
 
@@ -48,10 +48,9 @@ class Starts(NamedTuple):
     """Result of the starts of one teacher.
 
     Attributes:
-        stood: Number of starts at which it stood for good.
-        stayed: Number of starts at which it came less than 0.5 m far in the last 4 s, standing or
-            not.
-        share: Share of all steps in which it stood.
+        stood: Number of starts after which the vehicle stood for good.
+        stayed: Number of starts after which the vehicle moved less than 0.5 m in the last 4 s.
+        share: Share of all steps in which the vehicle stood.
         metres: Total progress, m.
         collisions: Number of collisions.
     """
@@ -64,7 +63,7 @@ class Starts(NamedTuple):
 
 
 def teachers() -> list[Row]:
-    """Judge teachers at starts off the lane and turned from it, as after a mistake."""
+    """Evaluate teachers from starts off the lane and turned away from it, as after a mistake."""
     seeds = range(int(os.environ.get("SEEDS", SEEDS)))
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         found = list(pool.map(_judged, seeds))

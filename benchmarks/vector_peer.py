@@ -2,7 +2,7 @@
 
 KIND is `ours`, `envpool` or `memory`. The process prints `ready` and its version; for each number
 of steps that it reads, it prints the seconds they took. `memory` prints the resident memory per
-env, in bytes, once. It imports none of our other modules, so that the peer can live in another
+env, in bytes, once. It imports none of our other modules, so that it can run in another Python
 environment.
 """
 
@@ -54,7 +54,7 @@ def _stepping(envs: Any, num_envs: int) -> Callable[[int], float]:
 
 
 def main() -> None:
-    """Answer until standard input ends."""
+    """Execute requests until standard input ends."""
     kind, num_envs, threads = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     if kind == "memory":
         import shapechanger

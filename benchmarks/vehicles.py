@@ -31,7 +31,7 @@ CLONE_LAYOUTS: Final = 20
 STUDENT_LAYOUTS: Final = 17  # 510 m.
 STUDENT_SEEDS: Final = 3
 EXPERT_MPS: Final = 1.88  # In benchmarks/results/vehicles-expert.json.
-# A shorter time limit for blind vehicles, which get nowhere.
+# Time limit for blind vehicles, which make little progress.
 BLIND_S: Final = 60.0
 
 ROUNDS: Final = 15
@@ -200,7 +200,7 @@ def clone() -> list[Row]:
 def students() -> list[Row]:
     """Score cars trained by RL on distances, and their students, which see only images.
 
-    `SEEDS` of each are trained from scratch by the command line.
+    The command line trains `SEEDS` of each from scratch.
     """
     rows: list[Row] = []
     for seed in range(int(os.environ.get("SEEDS", STUDENT_SEEDS))):

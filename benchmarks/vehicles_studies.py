@@ -26,7 +26,7 @@ from shapechanger.vehicles.envs.ranges import COLLISION_REWARD
 
 SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
-# Target time at which fine-tuning is compared with scratch.
+# Seconds of the target's driving after which fine-tuning is compared with scratch.
 _SECONDS: Final = (15, 30)
 # Limit of collisions per 100 m, and number of the twelve pairs that should stay below it.
 FEW: Final = 3.0
@@ -57,7 +57,7 @@ def lenses() -> list[Row]:
 
 
 def waypoints() -> list[Row]:
-    """All vehicles with waypoints as actions, after seconds of the target's driving."""
+    """Measure all pairs of vehicles with waypoint actions, by seconds of the target's driving."""
     _suite("waypoints")
     return waypoint_rows(Path("results", "waypoints"))
 

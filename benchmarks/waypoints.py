@@ -209,8 +209,8 @@ def _row(pair: tuple[str, str], drives: list[list[DriveResult]]) -> Row:
 def whole_robot() -> list[Row]:
     """Compare drives in the env that leaves the robot out with drives of the whole robot.
 
-    Each source drives its own vehicle, along the same courses from the same starts. `SEEDS` are
-    one by default, and `ONLY` names sources.
+    Each source drives its own vehicle, along the same courses from the same starts. `SEEDS` is 1 by
+    default, and `ONLY` names sources.
     """
     OUT.mkdir(parents=True, exist_ok=True)
     names = asked("source", OWN)
@@ -244,10 +244,10 @@ def whole_robot() -> list[Row]:
 
 
 def cameras() -> list[Row]:
-    """Compare drives of the car's clone behind other cameras with those behind its training's.
+    """Compare drives of the car's clone with other cameras and with the camera of its training.
 
-    The images are rectified by the profile of each camera, along the same courses from the same
-    starts. `SEEDS` are one by default.
+    The images are rectified by the profile of each camera. Drives are along the same courses from
+    the same starts. `SEEDS` is 1 by default.
     """
     OUT.mkdir(parents=True, exist_ok=True)
     seeds = range(int(os.environ.get("SEEDS", "1")))
@@ -274,7 +274,7 @@ def cameras() -> list[Row]:
 
 
 def _seen(job: tuple[str, int]) -> list[DriveResult]:
-    """Drive the car's clone behind a camera; cache it."""
+    """Drive the car's clone with a camera; cache the drives."""
     camera, seed = job
     use_one_thread()
     kept = OUT / f"car-{camera.replace(',', '').replace(' ', '-')}-{seed}.json"
@@ -294,7 +294,7 @@ def _seen(job: tuple[str, int]) -> list[DriveResult]:
 
 
 def remote() -> list[Row]:
-    """A clone of the tank drives a car behind guard, daemon and link, on the twin's clock."""
+    """Drive a car with a clone of the tank through guard, daemon and link, on the twin's clock."""
     OUT.mkdir(parents=True, exist_ok=True)
     policy = taught_source("tank", 0)
     drives = [_served("car", policy, course) for course in COURSES[:10]]
@@ -349,7 +349,7 @@ def _train(job: tuple[str, int]) -> None:
 
 
 def _driven(job: tuple[str, str, int, bool]) -> list[DriveResult]:
-    """Drive a source in a target, the whole robot of it if asked; cache it."""
+    """Drive a source's policy in a target, or in its whole robot; cache the drives."""
     source, target, seed, whole = job
     use_one_thread()
     kept = OUT / f"{source}-to-{target}-{seed}{'-whole' if whole else ''}.json"
@@ -363,10 +363,10 @@ def _driven(job: tuple[str, str, int, bool]) -> list[DriveResult]:
 
 
 def taught_source(name: str, seed: int) -> CameraPolicy:
-    """Clone the demonstrations of a source, of which each of its worlds gives an equal share.
+    """Clone the demonstrations of a source; each of its worlds has an equal share of them.
 
     Args:
-        name: Name of the source in `SOURCES`, or one that steers.
+        name: Name of the source in `SOURCES` or `BY_STEERING`.
         seed: Seed of the demonstrations and the training; the policy is kept.
     """
     path = OUT / f"{name}-{seed}.safetensors"
@@ -397,14 +397,14 @@ def taught_source(name: str, seed: int) -> CameraPolicy:
 
 
 class _Watched(Pilot):
-    """Expert that drives by steering, and the waypoints on its path.
+    """Expert that drives by steering, and reports the waypoints on its path.
 
     Args:
         env: The env of the vehicle.
         seed: Seed of the mistakes.
 
     Attributes:
-        waypoints: One for each step.
+        waypoints: The waypoint at each step.
     """
 
     def __init__(self, env: VehicleEnv, seed: int) -> None:

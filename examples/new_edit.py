@@ -1,7 +1,7 @@
 # /// script
 # dependencies = ["shapechanger[sim]", "tyro"]
 # ///
-"""Write an edit of a body that Shapechanger does not have: hinges that are turned."""
+"""Write an edit of a body that Shapechanger does not have: turn the axes of hinges."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class TurnHinge(Edit, frozen=True):
     angle: float
 
     def check(self) -> None:
-        """Refuse an angle that is no number, when the edit is made."""
+        """Refuse an angle that is not finite, when the edit is made."""
         if not math.isfinite(self.angle):
             raise MorphologyError(f"An angle must be finite, got {self.angle}.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Turn every hinge that matches; `amount` is the share of the change that is made."""
+        """Turn every matching hinge; `amount` is the fraction of the edit to apply."""
         turn = self.amount * self.angle
         matrix = np.array(
             [

@@ -3,7 +3,7 @@
 # ///
 """A custom transfer method, compared with scratch and fine-tuning on two poles.
 
-It freezes everything but the last layer. With the installed command, from this folder:
+The method freezes everything but the last layer. With the installed command, from this folder:
 
     shapechanger transfer InvertedPendulum BigInvertedPendulum --arms scratch new_method:last-layer
 """
@@ -44,7 +44,7 @@ class LastLayer(Method):
 
 
 def main(steps: int = 24_576, seeds: int = 3, out: Path = Path("results/last-layer")) -> None:
-    """Run the study, with this many steps in source and target."""
+    """Run the study, with `steps` training steps in source and target."""
     task = TransferTask(
         EnvRef("shapechanger/InvertedPendulum-v1"), EnvRef("shapechanger/BigInvertedPendulum-v1")
     )

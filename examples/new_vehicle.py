@@ -1,9 +1,9 @@
 # /// script
 # dependencies = ["shapechanger[sim,robot,remote]", "tyro"]
 # ///
-"""A new vehicle is a profile: a tracked one with two motors, tried on its twin.
+"""Describe a new tracked vehicle with two motors by a profile, and try it on its twin.
 
-The twin runs the real programs of the robot on simulated pins, so a swapped motor shows here first.
+The twin runs the robot's own programs on simulated pins, so it shows mistakes before wiring.
 """
 
 import tempfile
@@ -24,7 +24,7 @@ name = "snowcat"
 body = "tank"
 
 [action.steering]
-propels = true          # It turns the same motors.
+propels = true          # Steering turns the same motors as throttle.
 
 [action.throttle]
 propels = true
@@ -45,8 +45,8 @@ backward = 24
 mix = { throttle = 1.0, steering = -1.0 }
 
 [limits]
-deadline_ms = 300       # A command that is older stops it.
-arming = "anyone"       # A program may arm it; the default is a person.
+deadline_ms = 300       # Without a newer command, the robot stops.
+arming = "anyone"       # A program may arm the robot; by default only a person may.
 """
 
 
@@ -55,7 +55,7 @@ def main(steps: int = 40) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "snowcat.toml")
         path.write_text(PROFILE)
-        profile = load_profile(path)  # Every mistake is an error with its line.
+        profile = load_profile(path)  # The error for a mistake names the line.
         for steering, throttle in ((0.0, 1.0), (1.0, 0.0), (-0.5, 0.5)):
             left, right = output_values(profile.guard_plan(), [steering, throttle])
             print(

@@ -53,7 +53,7 @@ DOG = """
 
 
 class Trot:
-    """Run forwards with the trunk level."""
+    """Task of running forward with a level trunk."""
 
     def reward(self, robot: RobotState) -> dict[str, float]:
         """Return the terms of the reward; the env adds them up and reports each."""
@@ -69,7 +69,7 @@ class Trot:
 
 
 def distance(model: PPO, env: gym.Env[Any, Any], body: tuple[Any, ...]) -> float:
-    """Return how far the policy gets in an episode, m."""
+    """Return the distance that the policy covers in an episode, m."""
     observation, _ = env.reset(seed=0, options={"body": body})
     while True:
         action, _ = model.predict(observation, deterministic=True)

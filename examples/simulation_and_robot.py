@@ -1,13 +1,13 @@
 # /// script
 # dependencies = ["shapechanger[sim,robot,remote]", "tyro"]
 # ///
-"""The same script in simulation and on a robot: go where the floor reaches furthest.
+"""Run one script in simulation and on a robot: drive toward the farthest visible floor.
 
     python examples/simulation_and_robot.py                        # the simulated car
-    python examples/simulation_and_robot.py --robot my-car         # a real one, or its twin
+    python examples/simulation_and_robot.py --robot my-car         # a real car, or its twin
 
-`shapechanger robot serve my-car.toml --twin --arm-by-program` serves a twin. A robot that only a
-person may arm waits for `shapechanger robot drive my-car` in another terminal: E, then P.
+`shapechanger robot serve my-car.toml --twin --arm-by-program` serves a twin. If only a person may
+arm the robot, run `shapechanger robot drive my-car` in another terminal, and press E, then P.
 """
 
 import gymnasium as gym
@@ -18,17 +18,17 @@ import shapechanger  # noqa: F401  # Registers the ids.
 
 
 def drive(picture: np.ndarray) -> np.ndarray:
-    """Return steering and throttle from an image: go where the floor reaches furthest.
+    """Return steering (-1 is left) and throttle toward the farthest floor in an image.
 
     Args:
-        picture: RGB, (height, width, 3). -1 steers left.
+        picture: RGB, (height, width, 3).
     """
     height, width, _ = picture.shape
     rows = picture[: int(0.85 * height)].astype(float)  # Below is the car itself.
     colour = rows / (rows.sum(axis=2, keepdims=True) + 1.0)
     floor = colour[-6:, width // 3 : 2 * width // 3].mean(axis=(0, 1))
     is_floor = np.abs(colour - floor).sum(axis=2) < 0.06
-    depth = np.argmin(is_floor[::-1], axis=0) / len(rows)  # How high the floor reaches, by column.
+    depth = np.argmin(is_floor[::-1], axis=0) / len(rows)  # Height of the floor in each column.
     depth = np.convolve(depth, np.full(21, 1 / 21), "same")
     columns = np.linspace(-1.0, 1.0, width)
     heading = float((columns * depth**4).sum() / ((depth**4).sum() + 1e-9))
@@ -39,7 +39,7 @@ def drive(picture: np.ndarray) -> np.ndarray:
 
 
 def main(steps: int = 400, robot: str = "") -> None:
-    """Drive for this many steps; a robot is named as it is known, or by its address."""
+    """Drive for this many steps; `robot` is the name or address of a robot, "" the simulation."""
     env = (
         gym.make("shapechanger/RemoteVehicle-v1", robot=robot)
         if robot

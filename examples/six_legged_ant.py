@@ -21,13 +21,13 @@ SIX_LEGS = (
     AddLimb("front_left_leg", "_5", math.radians(-45.0)),
     AddLimb("front_right_leg", "_6", math.radians(45.0)),
 )
-# All names of a copied leg get the suffix.
+# All names in a copied leg get its suffix.
 SHANKS = ("shank_1", "shank_2", "shank_3", "shank_4", "shank_1_5", "shank_2_6")
 
 SIX_LEGGED = Family(
     name="SixLeggedAnt",
     bodies={"SixLeggedAnt": (), "FiveAndAHalf": (Cut("shank_1_5", 0.5),)},
-    rig=SIX_LEGS,  # Edits that all bodies of the family have, before their own.
+    rig=SIX_LEGS,  # Edits that come before the edits of each body of the family.
     bodies_by_joint={f"ankle_{leg}": f"shank_{leg}" for leg in (1, 2, 3, 4)},
     # Axes along which `Family.sample`, `train --bodies` and the arm `generalist` draw bodies.
     axes=length_axes(SHANKS, 0.6, 1.5) + strength_axes("torso"),
@@ -52,10 +52,10 @@ gym.register("SixLeggedAnt-v1", f"{__name__}:SixLeggedAntEnv", max_episode_steps
 
 
 def main(steps: int = 200_000) -> None:
-    """Train an ant of four legs for this many steps, and run its policy on six."""
+    """Train an ant with four legs for this many steps, and run its policy with six legs."""
     four, six = gym.make("shapechanger:shapechanger/Ant-v1"), gym.make("SixLeggedAnt-v1")
     model = PPO("MlpPolicy", four, n_steps=min(steps, 2048), seed=0).learn(steps)
-    # The fifth leg does what the first one does, the sixth what the second one does.
+    # The fifth leg copies the first leg, and the sixth leg the second.
     rules = {"*_1_5/motor": "copy *_1/motor", "*_2_6/motor": "copy *_2/motor"}
     layouts = [
         getattr(env.unwrapped, f"{side}_layout")

@@ -3,8 +3,8 @@
 # ///
 """A transfer study on a Ray cluster: from the pole of the paper to one twice as long.
 
-Without an address, Ray starts on this machine for the time of the study. On a cluster, the study's
-folder is one that all nodes share.
+Without an address, Ray starts on this machine for the time of the study. On a cluster, all nodes
+must share the folder of the study.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ def main(
     out: Path = Path("results/on-ray"),
     address: str | None = None,
 ) -> None:
-    """Run the study, with this many steps in source and target."""
+    """Run the study, with `steps` training steps in source and target."""
     task = TransferTask(
         EnvRef("shapechanger/InvertedPendulum-v1"), EnvRef("shapechanger/BigInvertedPendulum-v1")
     )

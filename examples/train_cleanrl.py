@@ -1,7 +1,7 @@
 # /// script
 # dependencies = ["shapechanger[sim]", "torch", "tyro"]
 # ///
-"""Learn to balance a long pole with an actor and a critic in one file, in the manner of CleanRL."""
+"""Learn to balance a long pole with an actor and a critic, in one file like CleanRL's."""
 
 import numpy as np
 import torch
@@ -28,7 +28,7 @@ def main(steps: int = 300_000) -> None:
     optimizer = torch.optim.Adam([*actor.parameters(), *critic.parameters(), log_std], lr=3e-3)
 
     def tensor(array):
-        """Return an array as float32, shape as it is."""
+        """Return a float32 tensor of the same shape."""
         return torch.as_tensor(np.asarray(array), dtype=torch.float32)
 
     observation = tensor(envs.reset(seed=0)[0])

@@ -20,7 +20,7 @@ def main(steps: int = 500_000) -> None:
     model = PPO("MlpPolicy", normalised, n_steps=256, batch_size=512, seed=0, device="cpu")
     model.learn(steps)
 
-    # How far it gets in five seconds, m.
+    # Distance that the ant covers in five seconds, m.
     normalised.training = False
     observation = normalised.reset()
     start = envs.envs[0].unwrapped.data.qpos[0]

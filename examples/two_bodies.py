@@ -1,7 +1,7 @@
 # /// script
 # dependencies = ["shapechanger[sim,learn]", "tyro"]
 # ///
-"""One policy on many bodies: train it with one pole, and balance others with it."""
+"""Train one policy on one pole, and balance other poles with it."""
 
 import gymnasium as gym
 import tyro
@@ -32,7 +32,7 @@ def main(steps: int = 25_000) -> None:
     for feature in source.unwrapped.observation_layout:
         print(f"{feature.name:16} {feature.unit}")
 
-    # What a longer pole changes, from the two compiled models and a rollout in each.
+    # The changes by a longer pole, from both compiled models and a rollout in each.
     print(shapechanger.certify(source, gym.make("shapechanger/BigInvertedPendulum-v1")))
 
     policy = PPO("MlpPolicy", source, seed=0, n_steps=512, learning_rate=1e-3, device="cpu")

@@ -19,7 +19,7 @@ STEPS = 30
 
 @pytest.fixture(scope="module")
 def ants() -> tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap]:
-    """Both envs, and the map that drives each foot like its ankle."""
+    """Both envs, and a body map in which each foot copies the command of its ankle."""
     ant, extended = gym.make("shapechanger/Ant-v1"), gym.make("shapechanger/ExtendedAnt-v1")
     return ant, extended, body_map(ant, extended, rules={"foot_*/motor": "copy ankle_*/motor"})
 
@@ -65,7 +65,7 @@ def test_the_transplanted_policy_acts_like_the_mapped_one(
 
 
 @pytest.mark.parametrize("kind", [PPO, SAC])
-def test_values_agree_on_real_observations(
+def test_values_agree_on_observations_of_a_rollout(
     ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap], kind: type[PPO] | type[SAC]
 ) -> None:
     """V and Q agree between source and target to 1e-6, in double precision."""
@@ -95,7 +95,7 @@ def test_values_agree_on_real_observations(
 def test_transplanting_back_restores_the_policy(
     ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap], kind: type[PPO] | type[SAC]
 ) -> None:
-    """Ant to ExtendedAnt to Ant acts like the original policy."""
+    """A policy that is moved from Ant to ExtendedAnt and back acts like the original policy."""
     ant, extended, crossing = ants
     source = perturbed_model(kind, ant)
     there = transplant(source, crossing, extended)

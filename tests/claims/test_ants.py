@@ -67,7 +67,7 @@ def _stretched(seed: int) -> Body:
 
 
 def _bodies(*bodies: tuple[str, Body]) -> Any:
-    """Parametrize over each ant of the catalogue, and ants of these bodies."""
+    """Parametrize a test over each ant of the catalogue, and over ants with these bodies."""
     cases = [pytest.param(env_id, {}, id=env_id) for env_id in _ANTS]
     passive = {"body": "ExtendedAntPassive"}
     cases.append(pytest.param("shapechanger/ExtendedAnt-v1", passive, id="passive feet"))
@@ -119,7 +119,7 @@ def _lowest(env: Any) -> float:
     return min(heights)
 
 
-# Starts.
+# Start poses
 
 
 @_any_ant
@@ -177,7 +177,7 @@ def test_the_standing_height_is_where_the_lowest_point_touches(
     assert _lowest(env) == pytest.approx(0.0, abs=1e-6)
 
 
-# Health.
+# Healthy range
 
 
 @_ants_that_stand
@@ -208,7 +208,7 @@ def test_a_flipped_ant_is_unhealthy_at_once(ant: Any) -> None:
         assert info["reward_survive"] == 0.0
 
 
-def test_a_flipped_ant_rests_where_one_lies_down(ant: Any) -> None:
+def test_a_flipped_ant_rests_as_low_as_one_that_lies_down(ant: Any) -> None:
     """Both rest at 0.27 m, so the height cannot distinguish them."""
     _place(ant, 0.5, _FLIPPED)
     for _ in range(200):
@@ -220,7 +220,7 @@ def test_a_flipped_ant_rests_where_one_lies_down(ant: Any) -> None:
 
 @pytest.mark.parametrize("lean_deg", [0.0, 60.0, 89.0, 91.0, 120.0, 180.0])
 def test_up_is_the_cosine_of_the_lean(ant: Any, lean_deg: float) -> None:
-    """An ant with a negative value is unhealthy."""
+    """An ant whose `up` is negative is unhealthy."""
     for heading in (0.0, 1.0, -2.5):
         lean = math.radians(lean_deg)
         quaternion, turn = np.zeros(4), np.zeros(4)
@@ -274,7 +274,7 @@ def test_termination_can_be_disabled() -> None:
     assert info["reward_survive"] == 0.0
 
 
-# Bodies.
+# Compiled bodies
 
 
 def test_the_ant_has_105_numbers_and_8_motors() -> None:
@@ -286,7 +286,7 @@ def test_the_ant_has_105_numbers_and_8_motors() -> None:
 
 
 def test_the_extended_ant_has_its_feet_last() -> None:
-    """Eight motors of the ant, then one for each foot, each of 150 N·m."""
+    """The motors of the ant come first, then one for each foot; each has 150 N·m."""
     with gym.make("shapechanger/ExtendedAnt-v1") as env, gym.make("shapechanger/Ant-v1") as ant:
         layout = env.unwrapped.action_layout
         assert layout.names[:8] == ant.unwrapped.action_layout.names
@@ -305,7 +305,7 @@ def test_the_extended_ant_starts_at_1_25_m() -> None:
 
 
 def test_the_extended_ants_ranges_mirror_each_other() -> None:
-    """Ankles of 30 to 50 degrees, feet of 30 to 70; legs 2 and 3 turn the other way."""
+    """Ranges are 30 to 50 degrees for ankles and 30 to 70 for feet, negative for legs 2 and 3."""
     with gym.make("shapechanger/ExtendedAnt-v1") as env:
         layout = env.unwrapped.observation_layout
     for joint, degrees in (("ankle", (30.0, 50.0)), ("foot", (30.0, 70.0))):

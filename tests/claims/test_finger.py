@@ -16,7 +16,7 @@ from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
 FINGER = "shapechanger/Finger-v1"
 TRACK = "shapechanger/FingerTrack-v1"
-# Outside of the seeds used for training and tuning.
+# First seed of the tests; training and tuning used lower seeds.
 FIRST_SEED = 2_000_000
 _CIRCLE = {"kind": "circle", "radius": 0.012, "hz": 0.5}
 

@@ -22,7 +22,7 @@ def test_corrections_improve_the_policy(tmp_path: Path) -> None:
     drive = ["demos", "record", "Car", "--minutes", "0.5", "--episode-s", "10", "--put-back"]
     main([*drive, "--out", shown])
     main(["demos", "train", shown, "--out", first, "--held-out", "0"])
-    main([*drive, "--seed", "1000", "--out", corrected])  # Courses that it has not seen.
+    main([*drive, "--seed", "1000", "--out", corrected])  # On courses that are new to the policy.
     watched = ("--driver", first, "--corrected-by", "expert")
     main([*drive, "--seed", "2000", "--out", corrected, *watched])
     main(["demos", "merge", shown, corrected, "--out", both])

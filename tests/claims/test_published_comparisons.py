@@ -59,7 +59,7 @@ def test_scratch_with_the_steps_of_the_source_is_ahead_in_seven_pairs(pairs):
     assert "ahead of\nfine-tuning in 7 of the 12 pairs of ants, and behind in 1" in ATLAS
 
 
-def test_differences_between_limbs_and_padding_are_those_of_the_runs():
+def test_differences_between_limbs_and_padding_equal_the_runs():
     runs = load("generalist-runs")
     text = " ".join(MANY_BODIES.split())
     for split in runs[0]["splits"]:
@@ -105,7 +105,7 @@ def test_from_a_body_that_walks_every_fine_tuned_run_ends_ahead(pairs):
     assert (len(walking), early) == (9, 8)
 
 
-def test_the_atlas_states_how_fast_sources_walk_and_big_ants_zero_shot(pairs):
+def test_the_atlas_states_the_speeds_of_sources_and_of_zero_shot_big_ants(pairs):
     def ends(source):
         runs = next(runs for pair, runs in pairs.items() if pair.startswith(f"{source}-to"))
         return " to ".join(f"{one(at_the_end(runs['source'])):.1f}" for one in (min, max))

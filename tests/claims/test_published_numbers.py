@@ -53,7 +53,7 @@ TABLES: Final = [
     ("cloning", "clone | no real frame", "cloning-real", "AUC"),
     ("gpu", "what |", "gpu", ""),
 ]
-# Cells and headers that the names of rows spell otherwise.
+# Texts in the names of rows for cells and headers that are worded differently.
 SPELLED: Final = {
     "Inverted": "InvertedPendulum",
     "Big": "BigInvertedPendulum",
@@ -160,10 +160,10 @@ def rows(files: str) -> list[tuple[str, str]]:
 
 
 def unbacked(text: str, files: str, name: str) -> list[str]:
-    """Return the numbers of a text that no row of this name contains, to the text's digits."""
-    told = " ".join(row for row_name, row in rows(files) if name in row_name)
-    assert told, f"No row of {files} has {name!r} in its name."
-    known = [float(one.replace(",", "")) for one in NUMBER.findall(told)]
+    """Return the numbers of a text that no such row contains, rounded to the text's digits."""
+    found = " ".join(row for row_name, row in rows(files) if name in row_name)
+    assert found, f"No row of {files} has {name!r} in its name."
+    known = [float(one.replace(",", "")) for one in NUMBER.findall(found)]
     lacking: list[str] = []
     for one in NUMBER.findall(text):
         value, digits = float(one.replace(",", "")), len(one.partition(".")[2])
@@ -201,7 +201,7 @@ def lines(name: str, header: str) -> Iterator[tuple[str, str, str]]:
 def test_tables(name: str, header: str, files: str, label: str) -> None:
     lacking: list[str] = []
     for first, column, cell in lines(name, header):
-        # Other tests check what is pooled over lines and counted over fingers.
+        # Other tests check pooled lines and counts of fingers.
         if first.startswith("**") or column.startswith("fingers with"):
             continue
         row = label.format(spelled(first, files), spelled(column, files))

@@ -1,4 +1,4 @@
-"""The envs of a finger on a rig through connection, daemon, guard and drivers to a simulation."""
+"""Envs of a finger on a rig, through connection, daemon, guard and drivers to a simulation."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -96,8 +96,8 @@ def test_sensed_values_are_near_the_truth(env: Env) -> None:
     assert info["distance"] == pytest.approx(info["true_distance"], abs=0.0002)
 
 
-def test_an_own_twin_defines_the_reward() -> None:
-    """Observations are sensed, the reward uses the truth, and the twin ends with the env."""
+def test_an_env_with_its_own_twin_is_rewarded_by_the_truth() -> None:
+    """Observations are measured, the reward uses true values, and the twin ends with the env."""
     env = gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=1)
     own: Any = env.unwrapped
     supervisor = own._own.supervisor
@@ -108,7 +108,7 @@ def test_an_own_twin_defines_the_reward() -> None:
         assert info["distance"] == pytest.approx(info["true_distance"], abs=1e-6)
         off.append(float(np.abs(observation[:4] - info["true_angles"]).max()))
     assert 0.002 < np.median(off) < 0.1  # Encoder noise of about a degree.
-    # Reset cools servos down.
+    # A reset lets the servos cool down.
     own._operator.break_servo("EDC", "hot")
     _, info = env.reset(seed=1)
     assert info["armed"]
@@ -118,7 +118,7 @@ def test_an_own_twin_defines_the_reward() -> None:
 
 
 def test_ten_seconds_identify_the_finger() -> None:
-    """Moment arms are identified within 5 %, where the nominal ones are off by more than 15 %."""
+    """Identified moment arms are off by less than 5 %, the nominal ones by more than 15 %."""
     with gym.make("shapechanger/Finger-v1", gap="real-like", finger_seed=0) as simulated:
         truth: FingerParameters = simulated.get_wrapper_attr("parameters")
     with gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=0) as rig:
@@ -136,7 +136,7 @@ def test_ten_seconds_identify_the_finger() -> None:
 
 
 def test_a_path_is_followed_on_its_own_twin() -> None:
-    """Layouts, start and point equal `FingerTrack-v1`'s, and the truth judges."""
+    """Layouts, start and target equal `FingerTrack-v1`'s, and the reward uses true values."""
     path = {"kind": "circle", "radius": 0.012, "hz": 0.5}
     policy = load_policy(POLICIES["track"])
     errors: list[float] = []
@@ -158,7 +158,7 @@ def test_a_path_is_followed_on_its_own_twin() -> None:
             errors.append(info["rms"])
         assert info["truncated_because"] == ""
         assert info["distance"] == pytest.approx(info["true_distance"], abs=1e-6)
-        # Another path, on the same connection.
+        # Another path is set without a new connection.
         _, info = rig.reset(seed=8, options={"path": "line"})
         assert there.path == as_path("line")
         with pytest.raises(PathError, match="leaves the finger's reach"):
@@ -166,12 +166,12 @@ def test_a_path_is_followed_on_its_own_twin() -> None:
     (start, target), (sensed, same) = begins
     np.testing.assert_array_equal(same, target)
     np.testing.assert_allclose(sensed, start, atol=0.1)
-    # The policy was trained without gears, delay and slew; it still follows, at a distance.
+    # The policy was trained without gears, delay and slew, so it follows with a larger error.
     assert errors[0] < 0.001 < errors[1] < 0.015
 
 
 def test_actions_of_length_drive_servos_that_control_lengths(tmp_path: Path) -> None:
-    """The same env moves a rig in current-based position mode, from the start of its episode."""
+    """With `actions="length"` the env moves a rig in current-based position mode."""
     text = find_profile("finger").read_text()
     keys = 'control = "length"\nlongest_m = 0.03\nshortest_m = -0.05\nmodel ='
     path = tmp_path / "finger.toml"

@@ -1,4 +1,4 @@
-"""`RemoteWaypoint-v1` over the real thing: link, daemon, guard, drivers, and a simulated car."""
+"""`RemoteWaypoint-v1` through link, daemon, guard and drivers to a simulated car."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
@@ -44,7 +44,7 @@ def _lab_car() -> Profile:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve, tmp_path: Path) -> None:
-    """The response equals the simulated car's; frames and actions equal all others'."""
+    """The measured response is near the simulated car's, and the spaces equal `CarWaypoint`'s."""
     with closing(WaypointEnv("car")) as simulated:
         expected = simulated.response
         stated = find_profile("lab-car").read_text(encoding="utf-8")
@@ -58,15 +58,15 @@ def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve, tmp_p
             assert found == pytest.approx(expected.per_metre + expected.per_second, rel=0.2)
             assert env.observation_space == simulated.observation_space
             assert env.action_space == simulated.action_space
-            operator.place(0)  # It has driven at random.
+            operator.place(0)  # The measurement drove the robot away from its start.
             seen, _ = env.reset(seed=0)
             assert env.observation_space.contains(seen)
-            rewards = [env.step(AHEAD)[1] for _ in range(40)]  # Its reflex ends after 0.75 s.
+            rewards = [env.step(AHEAD)[1] for _ in range(40)]  # The bump reflex ends after 0.75 s.
             assert sum(rewards) > 0.05
 
 
 def test_a_profile_may_state_how_the_robot_turns(serve: Serve) -> None:
-    """The shipped one is the simulated car's, and the robot need not measure it."""
+    """The shipped profile states the simulated car's response, so the robot does not measure it."""
     stated = _lab_car().turning
     assert stated is not None
     with closing(WaypointEnv("car")) as simulated:
@@ -77,7 +77,7 @@ def test_a_profile_may_state_how_the_robot_turns(serve: Serve) -> None:
         assert (response.per_metre, response.per_second) == stated
 
 
-def test_what_a_robot_lacks_is_named(serve: Serve, tmp_path: Any) -> None:
+def test_a_robot_without_a_measured_camera_is_refused(serve: Serve, tmp_path: Any) -> None:
     """A robot without a camera, or whose camera was not measured, is refused in a sentence."""
     blind = write_profile(tmp_path, BLIND_CAR)
     with pytest.raises(RobotRefused, match="has no camera"):

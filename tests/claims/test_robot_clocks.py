@@ -1,4 +1,4 @@
-"""Drives on the twin's clock, which repeat exactly, and a daemon that is killed between them."""
+"""Drives on the twin's clock repeat exactly, and clients wait for a killed daemon."""
 
 import os
 import signal
@@ -38,7 +38,7 @@ def robot(profile: Profile) -> Iterator[RunningRobot]:
         yield running
 
 
-def test_forty_commands(robot: RunningRobot) -> None:
+def test_forty_commands_are_applied(robot: RunningRobot) -> None:
     """Commands are applied in order, and the encoder matches the speed of the wheels."""
     times: list[int] = []
     with driving(robot, "twin") as car:
@@ -63,7 +63,7 @@ def test_without_commands_the_robot_stops_at_the_deadline(
     robot: RunningRobot, profile: Profile
 ) -> None:
     """The ledger shows rest within a tick of the deadline of the last command."""
-    # Without the one-shot, which would hide late pins.
+    # The one-shot would hide late pins, so the robot has none.
     wiring = TwinWiring(profile.guard_plan(), None)
     with driving(robot, "twin") as car:
         seen = car.drive(0.0, 1.0, steps=6)
@@ -93,7 +93,7 @@ def test_the_twins_clock_is_deterministic(profile: Profile, tmp_path: Path) -> N
 
 
 def test_a_client_waits_for_a_restarted_daemon(robot: RunningRobot) -> None:
-    """A killed daemon comes back at another port; who connects meanwhile gets that one."""
+    """A killed daemon restarts at another port, and a client that waits connects there."""
     before = robot.port
     os.kill(robot.pid_of("daemon"), signal.SIGKILL)
     ready = robot.folder / "ready.json"

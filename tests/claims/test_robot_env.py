@@ -24,7 +24,7 @@ def env_of(robot: RunningRobot) -> gym.Env[Any, Any]:
 
 
 def test_the_reward_is_the_distance_by_the_encoder(tmp_path: Path) -> None:
-    """`info` names the sensors, and the distance agrees with the twin."""
+    """The summed reward agrees with the distance on the twin, and `info` names the sensors."""
     profile = write_profile(tmp_path)
     with (
         run_robot(profile, clock="twin", arguments=IN_A_ROOM) as robot,
@@ -49,7 +49,7 @@ def test_the_reward_is_the_distance_by_the_encoder(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "actions"), [("cat", 12), ("finger-pwm", 7)])
 def test_bodies_that_do_not_drive(name: str, actions: int) -> None:
-    """The same env class moves legs and tendons, each to its command."""
+    """`RemoteVehicle-v1` also moves legs and tendons, each to its command."""
     profile = load_profile(find_profile(name))
     with (
         run_robot(profile, clock="twin", arguments=IN_A_ROOM) as robot,
@@ -58,7 +58,7 @@ def test_bodies_that_do_not_drive(name: str, actions: int) -> None:
     ):
         env.reset(seed=0)
         assert env.action_space.shape == (actions,)
-        # Different values, within all caps.
+        # Each action gets a different value within its cap.
         action = np.linspace(0.2, 0.6, actions, dtype=np.float32)
         for _ in range(100):
             *_, truncated, info = env.step(action)

@@ -15,17 +15,17 @@ from tests.robots import write_profile
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 MARGIN_MS = 5.0
-"""Margin on the promised time of a stop, which has the guard's tick of 10 ms in it.
+"""Margin on the promised time of a stop, which includes the guard's tick of 10 ms.
 
-The ledger and the times of faults have the same clock, CLOCK_MONOTONIC. A fault is dated before it
-is made, and a level when its process sends it to the board: one system call or message each, far
-below 1 ms. The board dates what it makes itself, when it tells the guard.
+The ledger and the times of faults use the same clock, CLOCK_MONOTONIC. A fault gets its time just
+before it happens, and a level when its process sends it to the board, which adds far less than
+1 ms. A fault that the board itself makes gets its time when the board reports it to the guard.
 """
 
 TRIALS = 2
 PILOT = "shapechanger.vehicles.remote.full_throttle"
 
-# Sleeps for 1 ms at a time. A line asks it for its longest delay.
+# Sleeps for 1 ms at a time; for each line of input, it prints its longest delay, ms.
 _WITNESS = """
 import select, sys, time
 from shapechanger.robot.guard.running import GUARD, run_promptly
@@ -47,8 +47,8 @@ while True:
 class Witness:
     """A process that measures how long this machine keeps a process of some priority waiting.
 
-    Nothing can stop in time while its machine runs nothing. The promise is about the robot, so this
-    time is added to it, instead of a factor for the worst machine.
+    A robot cannot stop in time while its machine does not run it. The promise is about the robot,
+    so the test adds this delay to the promised time, instead of a factor for the worst machine.
     """
 
     def __init__(self, priority: Literal["guard", "normal"]) -> None:

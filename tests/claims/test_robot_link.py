@@ -1,4 +1,4 @@
-"""The benchmark of the link still runs against today's daemon."""
+"""The benchmark of the link runs with the present daemon."""
 
 import pytest
 

@@ -47,8 +47,8 @@ def test_a_hoist_learns_the_same_in_newtons(tmp_path: Path) -> None:
 def test_a_hoist_of_30_newtons_learns(tmp_path: Path) -> None:
     """A hoist with a range of ±30 N learns like one with a range of ±1, from the same start.
 
-    A factor of 30 rounds, and after 32,768 steps roundings have become another training: the
-    returns were -66 and -286 with the same seed.
+    A factor of 30 changes roundings, so trainings with the same seed differ after 32,768 steps:
+    their returns were -66 and -286.
     """
     for each in ((30, 1), (1, 30)):
         curve = _curve(tmp_path / "hoist.xml", *each)

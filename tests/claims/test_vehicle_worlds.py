@@ -24,7 +24,7 @@ _COURSE, _START = 5, 11
 
 
 def test_swapped_pins_drive_a_car_backward(tmp_path: Path) -> None:
-    """In-process robots also act through the pins of their profile."""
+    """Robots in process also act through the pins of their profile."""
     path = find_profile("lab-car")
     text = Path(path).read_text()
     forward, backward = "forward = 22 ", "backward = 27 "
@@ -128,7 +128,7 @@ def test_a_bumped_wall_costs_ten_and_ends_the_episode() -> None:
     with closing(VehicleEnv("car", image=False, put_back=True)) as env:
         assert _until_it_bumps(env) == (-10.0, False)
         before = env.world.progress_m
-        for _ in range(30):  # The guard prevents driving forward for a while.
+        for _ in range(30):  # The bump reflex prevents driving forward for a while.
             _, _, terminated, _, info = env.step(np.array([0.0, 0.4], np.float32))
             assert not terminated
         assert info["collisions"] == 1

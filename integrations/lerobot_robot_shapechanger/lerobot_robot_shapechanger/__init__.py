@@ -1,4 +1,4 @@
-"""Robots of Shapechanger for LeRobot: each one a `Robot`, and the person at it a `Teleoperator`.
+"""Robots of Shapechanger as LeRobot's `Robot`, and their consoles as LeRobot's `Teleoperator`.
 
 LeRobot imports this package because its distribution is called `lerobot_robot_…`; the import
 registers both under the type `shapechanger`.
@@ -8,7 +8,7 @@ from lerobot_robot_shapechanger.config import ShapechangerConfig, ShapechangerCo
 from lerobot_robot_shapechanger.console import ShapechangerConsole
 from lerobot_robot_shapechanger.robot import Shapechanger
 
-# LeRobot finds the class of a device here, by the name of its configuration without "Config".
+# LeRobot looks up the class of a device here: the name of its configuration without "Config".
 __all__ = [
     "Shapechanger",
     "ShapechangerConfig",

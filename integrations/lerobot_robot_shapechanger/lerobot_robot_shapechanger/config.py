@@ -1,7 +1,7 @@
 """Configurations of both devices, which LeRobot fills from its command line.
 
-A robot's key is no part of them, because LeRobot logs and saves configurations: `id` is the name
-under which `shapechanger robot remember` stored the robot.
+They do not contain the robot's key, because LeRobot logs and saves configurations: `id` is the name
+under which `shapechanger robot remember` stored the robot and its key.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class ShapechangerConfig(RobotConfig):
 
     Attributes:
         id: Name of a known robot.
-        wait_s: Time that `connect` waits for a person who drives the robot or lets a program
+        wait_s: Time that `connect` waits until a person drives the robot or lets a program
             drive, s.
     """
 

@@ -14,9 +14,9 @@ from shapechanger.robot.client.operator import Takeover
 class ShapechangerConsole(Teleoperator):
     """Commands of the person who has control of a robot, from its console.
 
-    The person uses keys, the stick or a gamepad in the console, or `shapechanger robot drive`. What
-    the person commands acts on the robot directly, without LeRobot; here it is only read. The
-    action is at rest while no person has control of an armed robot.
+    The person uses keys, the stick or a gamepad in the console, or `shapechanger robot drive`. The
+    person's commands act on the robot directly, and this class only reads them. The action is at
+    rest while no person has control of an armed robot.
 
     Args:
         config: Name of the robot.
@@ -37,7 +37,7 @@ class ShapechangerConsole(Teleoperator):
 
     @property
     def feedback_features(self) -> dict[str, type]:
-        """None: the person sees the robot in the console."""
+        """Empty, because the person sees the robot in the console."""
         return {}
 
     @property
@@ -51,7 +51,7 @@ class ShapechangerConsole(Teleoperator):
         return True
 
     def connect(self, calibrate: bool = True) -> None:
-        """Connect to the robot, without control of it; raises as `Link.open` does.
+        """Connect to the robot without taking control; raises the errors of `Link.open`.
 
         Args:
             calibrate: Unused.

@@ -15,16 +15,16 @@ from shapechanger.robot.client.known_robots import known_names, recall
 from shapechanger.robot.client.observations import RobotSpaces
 from shapechanger.robot.link.messages import Welcome
 
-_NO_CAMERA: Final = (160, 120)  # Size of the images that a robot without a camera never sends.
+_NO_CAMERA: Final = (160, 120)  # Placeholder for the image size of a robot without a camera.
 
 
 class Link:
     """Connection to a known robot as a program, while it is open.
 
     Args:
-        robot: Name of the known robot; None for a missing one.
+        robot: Name of the known robot; None if LeRobot got no name.
         called: Display name of the program.
-        frames: Whether observations carry frames.
+        frames: Whether observations contain frames.
     """
 
     def __init__(self, robot: str | None, called: str, *, frames: bool) -> None:
@@ -53,11 +53,11 @@ class Link:
 
     @property
     def spaces(self) -> RobotSpaces:
-        """What the robot is like; where the link is not open, connect for a moment to ask.
+        """The robot's layouts and spaces; if unknown, read over a short connection.
 
         Raises:
             UnknownName: If there is no known robot of this name.
-            LinkError: If it cannot be reached.
+            LinkError: If the robot cannot be reached.
         """
         if self._spaces is None:
             with self._reach() as client:
@@ -70,8 +70,8 @@ class Link:
         Raises:
             DeviceAlreadyConnectedError: If the link is open.
             UnknownName: If there is no known robot of this name.
-            LinkError: If it cannot be reached.
-            RobotRefused: If it refuses the client, or its time moves in steps.
+            LinkError: If the robot cannot be reached.
+            RobotRefused: If the robot refuses the client, or its time moves in steps.
         """
         if self.is_open:
             raise DeviceAlreadyConnectedError(f"{self._robot} is connected already.")
@@ -87,10 +87,10 @@ class Link:
         return client
 
     def latest(self) -> Received:
-        """Return the newest observation; wait for a new one if that is older than one period.
+        """Return the newest observation; if it is older than one period, wait for the next.
 
         Raises:
-            LinkError: If the link is lost, or none arrives in time.
+            LinkError: If the link is lost, or no observation arrives in time.
         """
         client = self.client
         received = client.newest
@@ -99,7 +99,7 @@ class Link:
             received = client.ask()
         if received.message.seq != self._acknowledged:
             self._acknowledged = received.message.seq
-            client.acknowledge()  # Have the next one under way.
+            client.acknowledge()  # Request the next observation.
         return received
 
     def close(self) -> None:
@@ -119,7 +119,7 @@ class Link:
 
 
 def named(spaces: RobotSpaces, values: Sequence[float]) -> dict[str, float]:
-    """Return the values of an action by name, as LeRobot passes them."""
+    """Return the values of an action, keyed by name, as LeRobot passes them."""
     return dict(zip(spaces.action_layout.names, values, strict=True))
 
 

@@ -29,13 +29,13 @@ _log = logging.getLogger(__name__)
 class Shapechanger(Robot):
     """A robot of Shapechanger: a car, tank, boat, truck, cat or finger.
 
-    It is a program's client like any other: the robot's lease, deadline and guard hold, a person
-    takes control at any time, and only a person arms it, unless the robot lets programs. While a
-    person has control, actions are suggestions, which the person sees. An emergency stop or a
-    disarmed robot is a warning in the log, and LeRobot's loop goes on; a lost link ends it.
+    It is a client with the role "program": the robot's lease, deadline and guard apply, a person
+    can take control at any time, and only a person arms the robot, unless its profile lets programs
+    arm it. While a person has control, actions are suggestions, which the person sees. After an
+    emergency stop or a disarm, LeRobot's loop goes on and logs a warning; a lost link ends it.
 
     Args:
-        config: Name of the robot, and how long to wait for a person.
+        config: Name of the robot, and time to wait for a person.
     """
 
     config_class = ShapechangerConfig
@@ -86,8 +86,8 @@ class Shapechanger(Robot):
 
         Raises:
             UnknownName: If there is no known robot of this name.
-            LinkError: If it cannot be reached, or sends no image.
-            RobotRefused: If it refuses the client, or nobody lets it move within `wait_s`.
+            LinkError: If the robot cannot be reached, or sends no image.
+            RobotRefused: If the robot refuses the client, or nobody lets it move within `wait_s`.
         """
         client = self._link.open()
         try:
@@ -107,11 +107,11 @@ class Shapechanger(Robot):
     def get_observation(self) -> dict[str, Any]:
         """Return the robot's newest observation.
 
-        State without a measurement is the middle of its range, or 0 where that is infinite, because
-        one NaN would spoil the statistics of a dataset.
+        State without a measurement is the middle of its range, or 0 if the range is infinite,
+        because one NaN would spoil the statistics of a dataset.
 
         Returns:
-            Numbers of the state by name, and the image, RGB, `uint8`, shape (height, width, 3).
+            Numbers of the state, keyed by name, and the image, RGB, `uint8`, (height, width, 3).
 
         Raises:
             LinkError: If the link is lost, or no observation arrives in time.
@@ -126,16 +126,16 @@ class Shapechanger(Robot):
         return dict(zip(_state_names(spaces), state.tolist(), strict=True)) | image
 
     def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
-        """Send a command that answers the last observation; a suggestion while a person drives.
+        """Send a command that answers the last observation; while a person drives, a suggestion.
 
         Args:
-            action: One number for each action of the robot, by name; clipped to its range.
+            action: One number for each action of the robot, keyed by name; clipped to its range.
 
         Returns:
-            The command; that of the person who has control.
+            The command of the person who has control, or else `action` after clipping.
 
         Raises:
-            UnknownName: If the robot has no action of a name.
+            UnknownName: If a name is not an action of the robot.
             SpaceMismatch: If an action is missing, or not a finite number.
             LinkError: If the link is lost.
         """
@@ -150,10 +150,10 @@ class Shapechanger(Robot):
         self._link.close()
 
     def _await_driver(self, client: RobotClient) -> Received:
-        """Wait for an armed robot that we or a person drive, and its first image.
+        """Wait until this program or a person drives the armed robot, and its first image arrives.
 
         Raises:
-            RobotRefused: If none arrives in time.
+            RobotRefused: If this takes longer than `wait_s`.
         """
         robot, spaces = client.welcome.robot, self._link.spaces
         since, told = time.monotonic(), ""
@@ -183,7 +183,7 @@ class Shapechanger(Robot):
                 _log.warning("%s", waits)
 
     def _report(self, seen: Observation, absent: tuple[str, ...]) -> None:
-        """Log each change of who drives and of what is measured."""
+        """Log changes of the driver, and state that is no longer measured."""
         now = (seen.mine, seen.holder, seen.armed, seen.emergency)
         if now != self._reported:
             self._reported = now

@@ -40,19 +40,19 @@ class Person:
         self._thread: threading.Thread | None = None
 
     def drive(self, values: Sequence[float]) -> None:
-        """Take control from the program that has it or comes, and hold the stick."""
+        """Take control, also from a program, and hold the stick."""
         self._let_go.clear()
         self._thread = threading.Thread(target=self._hold, args=(tuple(values),))
         self._thread.start()
 
     def let_go(self) -> None:
-        """Let the stick go, and keep control."""
+        """Release the stick, and keep control."""
         self._let_go.set()
         if self._thread is not None:
             self._thread.join()
 
     def let_a_program_drive(self) -> None:
-        """Give control back, and arm the robot for the program that takes it: P in the console."""
+        """Give control back, and arm the robot for the program that takes control, as P does."""
         self.let_go()
         self.client.release()
         while self.client.ask().message.holder_role != "program":
@@ -72,7 +72,7 @@ class Person:
 
 @contextlib.contextmanager
 def served() -> Iterator[RunningRobot]:
-    """Serve a lab-car in the plain room on its twin, known by its name."""
+    """Serve the twin of a lab-car in the plain room, and store it as a known robot."""
     with (
         tempfile.TemporaryDirectory() as folder,
         run_robot(
@@ -92,7 +92,7 @@ def running() -> Iterator[RunningRobot]:
 
 @pytest.fixture
 def robot(running: RunningRobot) -> RunningRobot:
-    """The lab-car at its start, known by its name and disarmed."""
+    """The lab-car, disarmed at its start and stored as a known robot."""
     remember(dataclasses.replace(running.known, name=LAB_CAR))
     with running.operator() as operator:
         operator.place(0)
@@ -110,7 +110,7 @@ def person(robot: RunningRobot) -> Iterator[Person]:
 
 @pytest.fixture
 def until() -> Callable[[Callable[[], bool]], None]:
-    """Repeat something until it is true."""
+    """Call a function until it returns true."""
 
     def repeat(is_true: Callable[[], bool]) -> None:
         for _ in range(1_000):

@@ -1,4 +1,4 @@
-"""A teleoperator of LeRobot other than ours: a stick that always points ahead."""
+"""Another teleoperator of LeRobot: a stick that always points ahead."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Datasets: LeRobot reads what Shapechanger exports, and the other way round."""
+"""LeRobot reads datasets that Shapechanger exports, and Shapechanger those that LeRobot writes."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import export_recording, import_recording
 from shapechanger.demos.jpeg import decode_picture, encode_picture
 
-# LeRobot's default reader needs an FFmpeg of the system.
+# LeRobot's default reader needs FFmpeg libraries in the system.
 READER = "pyav"
 CAMERA = "observation.images.camera"
 NUMBERS = ("action", "observation.state", "next.reward")
 
 
 def smooth(number: int, width: int = 64, height: int = 48) -> np.ndarray:
-    """Return an image that video keeps well: a gradient, brighter by 5 with each number."""
+    """Return an image that changes little in video: a gradient, brighter by 5 per number."""
     ramp = np.linspace(0, 60, width)[None, :, None]
     return np.broadcast_to(ramp + 5.0 * number, (height, width, 3)).astype(np.uint8)
 
 
 def smooth_drive(data: Path, count: int, hz: float, *, rewarded: bool = True) -> None:
-    """Record an episode with such images."""
+    """Record an episode of these images."""
     rng = np.random.default_rng(count)
     steps = [
         (
@@ -85,7 +85,7 @@ def test_lerobot_reads_an_export(tmp_path: Path, images: bool, hz: float) -> Non
     assert window["action"][1].tolist() == dataset[36]["action"].tolist()
 
 
-def test_statistics_are_those_of_lerobot(tmp_path: Path) -> None:
+def test_statistics_equal_lerobots(tmp_path: Path) -> None:
     """Our statistics equal LeRobot's of the same numbers and images in one episode."""
     for count in (30, 12):
         smooth_drive(tmp_path / "data", count, 20.0)
@@ -100,7 +100,7 @@ def test_statistics_are_those_of_lerobot(tmp_path: Path) -> None:
         assert ours.keys() == expected[key].keys()
         for name, value in expected[key].items():
             assert ours[name].shape == value.shape
-            # LeRobot's quantiles come from a histogram of 5000 bins, with numbers in 32 bits.
+            # LeRobot computes quantiles from a histogram of 5000 bins, in 32 bits.
             bound = span / 5000 if name.startswith("q") else 1e-5 * span
             assert np.abs(ours[name] - value).max() <= bound + 1e-6, (key, name)
     every = np.stack([dataset[n][CAMERA].numpy() for n in range(42)])
@@ -110,8 +110,8 @@ def test_statistics_are_those_of_lerobot(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["video", "image", "none"])
-def test_we_read_what_lerobot_writes(tmp_path: Path, kind: str) -> None:
-    """Steps, names, tasks and the selected one of two cameras are imported."""
+def test_datasets_of_lerobot_are_imported(tmp_path: Path, kind: str) -> None:
+    """Steps, names, tasks and the selected camera of two are imported."""
     names = ["pan.pos", "tilt.pos"]
     features: dict[str, Any] = {
         "action": {"dtype": "float32", "shape": (2,), "names": names},
@@ -166,11 +166,11 @@ def test_we_read_what_lerobot_writes(tmp_path: Path, kind: str) -> None:
 
 @pytest.mark.parametrize("images", [False, True])
 def test_lerobot_continues_an_export(tmp_path: Path, images: bool) -> None:
-    """LeRobot adds an episode to ours; without our own file, both are imported."""
+    """LeRobot adds an episode to an export; without `meta/shapechanger.json` both are imported."""
     # LeRobot 0.4.4 cannot add a single number of 32 bits that is not in a vector.
     smooth_drive(tmp_path / "data", 5, 20.0, rewarded=False)
     export_recording(tmp_path / "data", tmp_path / "set", "lerobot", task="A.", images=images)
-    resume = getattr(LeRobotDataset, "resume", LeRobotDataset)  # The former in 0.6.
+    resume = getattr(LeRobotDataset, "resume", LeRobotDataset)  # `resume` exists since 0.6.
     dataset = resume("ours/set", root=tmp_path / "set")
     for n in range(4):
         dataset.add_frame(
@@ -198,8 +198,8 @@ def test_lerobot_continues_an_export(tmp_path: Path, images: bool) -> None:
     assert all(np.abs(pixels - smooth(n)).mean() < 2.5 for n, pixels in enumerate(seen))
 
 
-def test_the_keys_of_info(tmp_path: Path) -> None:
-    """`info.json` has the keys and the paths that LeRobot writes itself."""
+def test_info_has_the_keys_of_lerobot(tmp_path: Path) -> None:
+    """`info.json` has the keys and paths that LeRobot writes."""
     smooth_drive(tmp_path / "data", 5, 20.0)
     export_recording(tmp_path / "data", tmp_path / "ours", "lerobot")
     LeRobotDataset.create(

@@ -66,7 +66,7 @@ def tin(tmp_path: Path) -> Iterator[Callable[..., Robot]]:
         yield start
 
 
-def test_features_are_those_of_the_layouts(robot: RunningRobot) -> None:
+def test_features_equal_the_layouts(robot: RunningRobot) -> None:
     """Features are known before `connect`, and observations have exactly these features."""
     car = lab_car()
     assert car.action_features == {"steering": float, "throttle": float}
@@ -87,7 +87,7 @@ def test_features_are_those_of_the_layouts(robot: RunningRobot) -> None:
 def test_a_program_drives_until_a_person_takes_over(
     robot: RunningRobot, person: Any, until: Any
 ) -> None:
-    """The person's commands act and are the action; P gives control back."""
+    """The robot applies the person's commands, and `send_action` returns them; P ends that."""
     with lab_car() as car, console() as teleop:
         until(lambda: throttle(car) > 0.0)
         assert car.send_action(AHEAD) == AHEAD
@@ -114,7 +114,7 @@ def test_a_program_drives_until_a_person_takes_over(
 def test_an_emergency_stop_is_a_warning(
     robot: RunningRobot, person: Any, until: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """LeRobot's loop goes on with the robot at rest, and cannot end the stop."""
+    """After an emergency stop the robot stays at rest, and LeRobot's loop goes on."""
     with lab_car() as car:
         until(lambda: throttle(car) > 0.0)
         person.client.emergency_stop("enough")
@@ -127,7 +127,7 @@ def test_an_emergency_stop_is_a_warning(
 
 
 def test_disconnecting_stops_the_robot(robot: RunningRobot, person: Any, until: Any) -> None:
-    """The robot is disarmed, and nobody has control."""
+    """After `disconnect` the robot is disarmed, and no client has control."""
     car = lab_car()
     with pytest.raises(DeviceNotConnectedError, match="lab-car is not connected"):
         car.get_observation()
@@ -156,7 +156,7 @@ def test_actions_are_checked(robot: RunningRobot) -> None:
 
 
 @pytest.mark.parametrize("make", [lab_car, console])
-def test_a_robot_needs_its_name(robot: RunningRobot, make: Callable[[], Any]) -> None:
+def test_the_name_of_the_robot_is_checked(robot: RunningRobot, make: Callable[[], Any]) -> None:
     """The error for a wrong name suggests the nearest name; for a missing one it lists all."""
     device = make()
     wrong = type(device)(device.config_class(id="lab-cra"))
@@ -166,7 +166,7 @@ def test_a_robot_needs_its_name(robot: RunningRobot, make: Callable[[], Any]) ->
         type(device)(device.config_class()).connect()
 
 
-def test_only_a_person_arms_a_robot_that_says_so(tin: Callable[..., Robot]) -> None:
+def test_only_a_person_arms_a_robot_whose_profile_requires_it(tin: Callable[..., Robot]) -> None:
     """LeRobot does not drive before a person arms the robot, and gives up with one sentence."""
     fake = tin(arming="person")
     car = Shapechanger(ShapechangerConfig(id="tin", wait_s=0.2))
@@ -175,14 +175,14 @@ def test_only_a_person_arms_a_robot_that_says_so(tin: Callable[..., Robot]) -> N
     assert not car.is_connected
     assert not fake.received(m.Arm)
     assert not fake.received(m.Command)
-    fake.arm_by_itself = True  # As by a person, once a program has control.
+    fake.arm_by_itself = True  # A person arms it once a program has control.
     with car:
         car.send_action(AHEAD)
         car.get_observation()
     assert not fake.received(m.Arm)
 
 
-def test_what_nothing_measures_is_no_nan(
+def test_a_missing_measurement_is_not_nan(
     tin: Callable[..., Robot], caplog: pytest.LogCaptureFixture
 ) -> None:
     """A missing measurement is the middle of its range, or 0 if that is infinite; it is logged."""
@@ -194,8 +194,8 @@ def test_what_nothing_measures_is_no_nan(
     assert caplog.text.count("Nothing measures battery, collision") == 1
 
 
-def test_a_robot_without_a_camera(tin: Callable[..., Robot]) -> None:
-    """A robot without a camera has only a state."""
+def test_a_robot_without_a_camera_has_no_image(tin: Callable[..., Robot]) -> None:
+    """The observation contains only the state."""
     tin(image_size=None)
     with Shapechanger(ShapechangerConfig(id="tin")) as car:
         assert car.cameras == {}
@@ -203,8 +203,8 @@ def test_a_robot_without_a_camera(tin: Callable[..., Robot]) -> None:
         assert all(kind is float for kind in car.observation_features.values())
 
 
-def test_a_camera_without_a_picture_is_named(tin: Callable[..., Robot]) -> None:
-    """`connect` waits for an image no longer than for a person."""
+def test_a_camera_that_sends_no_image_is_reported(tin: Callable[..., Robot]) -> None:
+    """`connect` waits at most `wait_s` for an image."""
     tin(jpeg=b"no picture")
     car = Shapechanger(ShapechangerConfig(id="tin", wait_s=0.2))
     with pytest.raises(RobotRefused, match="sends no picture"):
@@ -223,8 +223,8 @@ def test_a_twin_whose_time_moves_in_steps_is_refused(tin: Callable[..., Robot]) 
 
 
 @pytest.mark.parametrize("fault", ["cut", "silent"])
-def test_a_lost_link_is_a_sentence(tin: Callable[..., Robot], fault: str) -> None:
-    """A cut connection and a silent one end the loop, and the robot can be connected again."""
+def test_a_lost_link_ends_the_loop(tin: Callable[..., Robot], fault: str) -> None:
+    """The error for a cut or silent link is one sentence, and the robot can be connected again."""
     fake = tin()
     with Shapechanger(ShapechangerConfig(id="tin")) as car:
         car.get_observation()

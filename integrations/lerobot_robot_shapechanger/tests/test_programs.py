@@ -23,7 +23,7 @@ from shapechanger.robot.twin.robot import RunningRobot
 from .conftest import served
 from .stick import Stick, StickConfig
 
-AHEAD = (-1.0, 0.3)  # In a circle.
+AHEAD = (-1.0, 0.3)  # Steering and throttle of a circle to the left.
 PROGRAMS = Path(sys.executable).parent
 
 
@@ -35,7 +35,7 @@ def at_the_wheel(person: Any) -> Any:
 
 
 def arguments(robot: str = "lab-car") -> list[str]:
-    """Return the arguments of both programs."""
+    """Return the arguments that both programs take."""
     return [
         "--robot.type=shapechanger",
         f"--robot.id={robot}",
@@ -50,7 +50,7 @@ def run(program: str, *more: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_another_device_of_lerobot_drives(robot: RunningRobot, until: Any) -> None:
+def test_another_teleoperator_drives_the_robot(robot: RunningRobot, until: Any) -> None:
     """`lerobot-teleoperate` moves the robot, and stops it at the end."""
     teleoperate(
         TeleoperateConfig(
@@ -67,7 +67,7 @@ def test_another_device_of_lerobot_drives(robot: RunningRobot, until: Any) -> No
 
 
 def test_a_person_drives_within_lerobot(robot: RunningRobot, at_the_wheel: Any) -> None:
-    """LeRobot passes the person's own commands back, and the robot follows the person."""
+    """LeRobot sends back the person's own commands, and the robot follows the person."""
     teleoperate(
         TeleoperateConfig(
             teleop=ShapechangerConsoleConfig(id="lab-car"),
@@ -80,7 +80,7 @@ def test_a_person_drives_within_lerobot(robot: RunningRobot, at_the_wheel: Any) 
     assert suggested[-1].suggested == pytest.approx(AHEAD)
     assert suggested[-1].suggested_by == "lerobot"
     at_the_wheel.let_go()
-    assert at_the_wheel.client.ask().message.mine  # The end of LeRobot does not disturb the person.
+    assert at_the_wheel.client.ask().message.mine  # The person still has control.
     assert all(seen.mine for seen in at_the_wheel.seen)
 
 
@@ -114,7 +114,7 @@ def test_a_dataset_has_what_the_person_did(
     assert {int(frame["episode_index"]) for frame in frames} == {0, 1}
     assert {frame["task"] for frame in frames} == {"Drive through the room."}
     actions = np.array([frame["action"].numpy() for frame in frames])
-    # A person whose thread is late rests for a moment.
+    # If the person's thread is late, the robot rests for a moment.
     driven = np.isclose(actions, AHEAD).all(axis=1)
     assert np.mean(driven) > 0.5
     assert (actions[~driven] == 0.0).all()
@@ -131,7 +131,7 @@ def test_a_dataset_has_what_the_person_did(
 
 
 def test_a_wrong_name_shows_the_nearest(robot: RunningRobot) -> None:
-    """The last line of `lerobot-teleoperate` is the sentence; LeRobot finds our package itself."""
+    """`lerobot-teleoperate` finds our package by its name, and its last line is the error."""
     done = run("lerobot-teleoperate", *arguments("lab-cra"))
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
@@ -173,7 +173,7 @@ def test_an_unplugged_robot_costs_one_episode(
         play_sounds=False,
     )
     with served() as robot:
-        _kill_at_action(25, robot, monkeypatch)  # Of at most twenty in an episode.
+        _kill_at_action(25, robot, monkeypatch)  # In the second episode: one has 20 at most.
         with pytest.raises(LinkError) as lost:
             record(config)
     _assert_is_a_sentence(lost.value)
