@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Run benchmarks of a GPU on a machine that has no network.
 #
-#   scripts/gpu_machine.sh prepare   here: wheels, Warp's library and compiled kernels into .gpu1
-#                                    and .gpu2, each below 60 MB; some fifteen minutes of two cores
-#   scripts/gpu_machine.sh install   there, with the repository, .gpu1 and .gpu2 (one after the other
-#                                    will do): unpack them into /tmp/gpu; half a minute
-#   scripts/gpu_machine.sh run       there: `python -m benchmarks.run gpu`, or the suites that follow
-#                                    `run`; two minutes; results in $OUT
+#   prepare   on a machine with a network: put wheels, Warp's library and compiled kernels into the
+#             folders .gpu1 and .gpu2, each below 60 MB; takes fifteen minutes of two cores
+#   install   on the GPU machine, which needs the repository and both folders, at once or one after
+#             the other: unpack them into /tmp/gpu; takes half a minute
+#   run       on the GPU machine: run `python -m benchmarks.run gpu`, or the suites that are named
+#             after `run`, and write the results to $OUT; takes two minutes
 #
-# That machine has an NVIDIA driver, x86-64 Linux, Python 3.12, NumPy, SciPy, and PyTorch with CUDA.
+# The GPU machine needs x86-64 Linux, an NVIDIA driver, Python 3.12, NumPy, SciPy and PyTorch (CUDA).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -36,7 +36,7 @@ prepare() {
     unzip -q "$work"/warp_lang-*.whl -d "$work/warp" -x 'warp/examples/*' 'warp/tests/*' \
         'warp/bin/warp-clang.so'
     rm "$work"/warp_lang-*.whl
-    # Our own package runs from `src`, and looks up its version.
+    # Our own package runs from `src`, but its version is read from this folder.
     cp -r .venv/lib/python3*/site-packages/shapechanger-*.dist-info "$work/warp/"
     sha256sum <"$work/warp/warp/bin/warp.so" | cut -d' ' -f1 >.gpu2/warp.so.sha256
     nice xz -c --x86 --lzma2="preset=${XZ_PRESET:-9e},dict=192MiB" "$work/warp/warp/bin/warp.so" |
@@ -58,7 +58,7 @@ install() {
     for part in .gpu1 .gpu2; do
         if [ -d "$part" ]; then cp -n "$part"/* "$there/parts/"; fi
     done
-    [ -e "$there/parts/warp.so.sha256" ] || return 0 # The other part comes later.
+    [ -e "$there/parts/warp.so.sha256" ] || return 0 # The second folder comes later.
     [ -e "$there/installed" ] && return 0
     python3 -m pip install --quiet --no-index --no-deps --no-compile --target "$there/site" \
         "$there"/parts/*.whl
