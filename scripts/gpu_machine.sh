@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Run benchmarks of a GPU on a machine that has no network.
+# Run GPU benchmarks on a machine without a network: `scripts/gpu_machine.sh COMMAND`.
 #
 #   prepare   on a machine with a network: put wheels, Warp's library and compiled kernels into the
 #             folders .gpu1 and .gpu2, each below 60 MB; takes fifteen minutes of two cores
