@@ -1,4 +1,4 @@
-"""The bodies of the 2017 Shapechanger release, bit for bit.
+"""Edits make the bodies of the 2017 Shapechanger release, equal bit for bit.
 
 The release had a model file for each body. Here the same files are made from Gymnasium's by text
 replacement, and compiled by MuJoCo without edits.
@@ -88,7 +88,7 @@ def test_edits_make_the_bodies_of_the_release(name: str) -> None:
 
 
 def test_every_named_body_is_compared() -> None:
-    """A body added to a family needs its model here."""
+    """Each body of a family has its model of the release here."""
     assert {*ANT.bodies, *PENDULUM.bodies} == {*_RELEASED}
 
 
@@ -100,5 +100,5 @@ def test_every_named_body_is_compared() -> None:
     ],
 )
 def test_masses_of_the_ants(name: str, kilograms: float) -> None:
-    """The total masses are those in the documentation."""
+    """The total masses equal the documented ones."""
     assert _edited(name).body_mass.sum() == pytest.approx(kilograms, abs=5e-4)

@@ -63,7 +63,7 @@ def test_without_commands_the_robot_stops_at_the_deadline(
     robot: RunningRobot, profile: Profile
 ) -> None:
     """The ledger shows rest within a tick of the deadline of the last command."""
-    # The one-shot would hide late pins, so the robot has none.
+    # The one-shot would hide late pins, so only the pins are judged.
     wiring = TwinWiring(profile.guard_plan(), None)
     with driving(robot, "twin") as car:
         seen = car.drive(0.0, 1.0, steps=6)
