@@ -130,7 +130,7 @@ def _half_way(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
 
 
 def _rig_only_rows(target: EnvRef, fingers: int, where: str) -> list[Row]:
-    """Return the success of a policy that knows the rig's motors and delay only, if asked for."""
+    """Return the success of a policy trained with only the rig's motors and delay, if requested."""
     if _RIG_ONLY not in asked("arm or row", (*_GAP_ARMS, _RIG_ONLY)):
         return []
     policy = load_policy(trained(_RIG_ONLY, 0))

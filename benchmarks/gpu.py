@@ -283,7 +283,7 @@ def differing() -> Iterator[Row]:
     """Compare ants with different legs, and ants that are drawn from a pool, with equal ants."""
     count = MANY if GPU else FEW
     bodies = [[Stretch("shank_*", 0.8 + 0.4 * i / 63)] for i in range(FEW)]
-    # The body in the middle, so that both sides touch the floor equally often.
+    # Equal ants have the middle length, so that both sides touch the floor equally often.
     equal = made("Ant", count)
     sides = {
         "differing bodies": made("Ant", count, bodies=[bodies[i % FEW] for i in range(count)]),

@@ -1,7 +1,7 @@
 """Speed of many ants stepped together, compared with bare physics and other libraries.
 
 Rounds are paired: each runs both sides one after the other, in alternating order, and gives one
-ratio. Where the states of both sides can be set, a round starts all envs from the same states.
+ratio. If the states of both sides can be set, a round starts all envs from the same states.
 """
 
 from __future__ import annotations

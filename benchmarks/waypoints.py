@@ -139,7 +139,7 @@ def pairs() -> list[Row]:
 def worlds() -> list[Row]:
     """Measure pairs with the boat, and sources that were taught in other worlds.
 
-    All targets are judged in the corridor, the boat in the flooded one. `ONLY` names pairs, such as
+    Targets drive in the corridor, the boat in the flooded corridor. `ONLY` names pairs, such as
     `yard-truck-to-car`.
     """
     land = [(source, target) for source in ACROSS for target in VEHICLES]

@@ -32,7 +32,7 @@ def main(steps: int = 25_000) -> None:
     for feature in source.unwrapped.observation_layout:
         print(f"{feature.name:16} {feature.unit}")
 
-    # The changes by a longer pole, from both compiled models and a rollout in each.
+    # The effects of a longer pole, from both compiled models and a rollout in each.
     print(shapechanger.certify(source, gym.make("shapechanger/BigInvertedPendulum-v1")))
 
     policy = PPO("MlpPolicy", source, seed=0, n_steps=512, learning_rate=1e-3, device="cpu")

@@ -1,8 +1,8 @@
 """Hooks of MkDocs for the site, which `make docs` builds: pages from the code, and clips.
 
-In the site a file has its path in the repository, so that its links lead where they lead on a code
-host: from `docs/atlas.md` to `../CONTRIBUTING.md`. Comments such as `<!-- keys: profile limits -->`
-are replaced by tables of the keys of profiles and messages.
+Files of the site have the same paths as in the repository, so that relative links work in both,
+such as `../CONTRIBUTING.md` in `docs/atlas.md`. Comments such as `<!-- keys: profile limits -->` are
+replaced by tables of the keys of profiles and messages.
 """
 
 import html
