@@ -1,8 +1,8 @@
 """Hooks of MkDocs for the site, which `make docs` builds: pages from the code, and clips.
 
 Files of the site have the same paths as in the repository, so that relative links work in both,
-such as `../CONTRIBUTING.md` in `docs/atlas.md`. Comments such as `<!-- keys: profile limits -->` are
-replaced by tables of the keys of profiles and messages.
+such as `../CONTRIBUTING.md` in `docs/atlas.md`. Comments such as `<!-- keys: profile limits -->`
+are replaced by tables of the keys of profiles and messages.
 """
 
 import html
