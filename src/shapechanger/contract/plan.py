@@ -77,10 +77,15 @@ class ActionPlan:
 
 @dataclass(frozen=True, slots=True)
 class OutputPlan:
-    """One motor, servo or controller, named such as "left", with a driver such as "hbridge".
+    """One motor, servo or controller, whose `settings` contain all defaults of its driver.
 
-    Its value is `offset` plus the sum of the actions with the weights `mix`, clipped to -1 to 1.
-    The settings of the driver, such as pins and pulse widths, contain all defaults.
+    Its value is `offset` plus the weighted sum of the actions, clipped to -1 to 1.
+
+    Attributes:
+        driver: Name of the driver, such as "hbridge".
+        part: The part that the output moves, such as "wheels" or "left track"; may be empty.
+        mix: Weight of each action.
+        offset: Value if all actions are 0.
     """
 
     name: str
@@ -93,10 +98,12 @@ class OutputPlan:
 
 @dataclass(frozen=True, slots=True)
 class SensorPlan:
-    """One sensor of the guard, named such as "bumper", with a driver such as "switch".
+    """One sensor of the guard, whose `settings` contain all defaults of its driver.
 
     It measures "speed", "bump", "distance", "imu", "battery", "temperature", "tendons" or "joints".
-    The settings of the driver contain all defaults.
+
+    Attributes:
+        driver: Name of its driver, such as "switch".
     """
 
     name: str
