@@ -30,7 +30,8 @@ def _blind(kind: str) -> Profile:
 def _install(pi: FakePi, robot: Profile, *, dry: bool = False) -> dict[str, tuple[str, str]]:
     unit, _ = write_unit(robot.name, pi.root / "my home" / f"{robot.name}.toml")
     changes = changes_to_install(robot, unit, pi.machine)
-    return {o.change.name: (o.level, o.sentence) for o in make_changes(changes, pi.run, dry=dry)}
+    made = make_changes(changes, pi.run, dry=dry)
+    return {change.name: (level, sentence) for change, level, sentence in made}
 
 
 def _levels(found: dict[str, tuple[str, str]]) -> dict[str, str]:
@@ -95,7 +96,7 @@ def test_the_service_is_removed(pi: FakePi) -> None:
     assert "safe-pins" in (pi.root / _UNIT).read_text()
     for level in ("did", "already"):
         changes = changes_to_remove("shapechanger-car.service", pi.root)
-        assert [outcome.level for outcome in make_changes(changes, pi.run)] == [level]
+        assert [made for _, made, _ in make_changes(changes, pi.run)] == [level]
     assert not list((pi.root / "etc/systemd").rglob("shapechanger*"))
     assert "dtparam=strict_gpiod" in pi.config
 

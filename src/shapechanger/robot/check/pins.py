@@ -111,11 +111,9 @@ def pin_level(pin: int, hardware: Hardware, *, pull_up: bool) -> int:
         return int(device.is_active != pull_up)
 
 
-SHOWN_S: Final = 0.5
-"""Time for which an LED is lit if no person is asked, s."""
-
+SHOWN_S: Final = 0.5  # Time for which an LED is lit if no person is asked, s.
+# Function that asks a person a question; it returns None without an answer.
 Ask = Callable[[str], bool | None]
-"""Function that asks a person a question; it returns None without an answer."""
 
 
 class BenchLamp(NamedTuple):
@@ -159,8 +157,7 @@ def check_lamps(
     """Light each LED alone, and ask or measure whether it is lit.
 
     `connect_pins` opens the pins and buses, which no other program may use meanwhile. `sees`
-    measures whether an LED is lit, and returns None if it cannot. If `ask` returns None, the LED
-    is lit for `shown_s` seconds.
+    measures whether an LED is lit, and returns None if it cannot.
     """
     for lamp in lamps_of(plan):
         check = f"LED {lamp.place}"
@@ -189,7 +186,7 @@ def _lit(lamp: BenchLamp, plan: GuardPlan, hardware: Hardware) -> Generator[None
         with closing(Switches(plan, hardware)) as switches:
             switches.toggle()  # From low to high.
             yield
-    else:
-        with closing(OUTPUTS[lamp.output.driver].open(lamp.output, hardware)) as driver:
-            driver.write(lamp.value, hardware.clock.now_ns())
-            yield
+        return
+    with closing(OUTPUTS[lamp.output.driver].open(lamp.output, hardware)) as driver:
+        driver.write(lamp.value, hardware.clock.now_ns())
+        yield

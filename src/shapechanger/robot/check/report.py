@@ -24,18 +24,10 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.install import Machine
 
 Level = Literal["good", "bad", "unknown"]
-
-Result = tuple[Level, str]
-"""A level and a sentence."""
-
-Results = Iterable[Result]
-"""A check: an iterator that performs it step by step and yields its results."""
-
-Checks = Iterable[tuple[str, Results]]
-"""Checks with their names; each begins when the previous one has ended."""
-
+Result = tuple[Level, str]  # A level and a sentence.
+Results = Iterable[Result]  # A check: an iterator that performs it and yields its results.
+Checks = Iterable[tuple[str, Results]]  # Each begins when the previous one has ended.
 MARKS: Final[dict[Level, str]] = {"good": "good", "bad": "BAD", "unknown": "?"}
-"""Words for the levels in reports."""
 
 
 class Finding(NamedTuple):
@@ -47,7 +39,7 @@ class Finding(NamedTuple):
 
 
 def judged(good: bool, sentence: str, otherwise: str = "") -> Result:
-    """Return a good result, or a bad one with the sentence `otherwise` if it is not empty."""
+    """Return a good result, or a bad one with the sentence `otherwise`, if given."""
     return ("good", sentence) if good else ("bad", otherwise or sentence)
 
 
@@ -128,11 +120,9 @@ def write_report(
 ) -> bool:
     """Run the parts of a check, and report each finding as it comes.
 
-    `say` shows a person each line. The file at `path`, if any, begins with the `head`, and lacks
-    the names of the computer and its user. If it exists, a number is added to the name.
-
-    Returns:
-        Whether no finding was bad.
+    Return whether no finding was bad. `say` shows a person each line. The file at `path`, if any,
+    begins with the `head`, and lacks the names of the computer and its user. If it exists, a number
+    is added to the name.
     """
     if path is not None:
         names = (path.with_stem(f"{path.stem}-{number}") for number in count(2))

@@ -73,11 +73,7 @@ def servo_devices(guard: GuardPlan) -> list[str]:
 
 def unit_name(robot: str) -> str:
     """Return the name of a robot's systemd unit; one computer may serve several robots."""
-    return f"shapechanger-{_plain(robot)}.service"
-
-
-def _plain(robot: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_.-]", "-", robot)
+    return f"shapechanger-{re.sub(r'[^A-Za-z0-9_.-]', '-', robot)}.service"
 
 
 def unit_word(text: str) -> str:
@@ -100,7 +96,7 @@ def write_unit(
     options = f" --credentials {unit_word(str(credentials.absolute()))}" if credentials else ""
     values = {
         "UNIT": path.stem,
-        "ROBOT": _plain(robot),
+        "ROBOT": path.stem.removeprefix("shapechanger-"),
         "PROFILE": unit_word(str(profile.absolute())),
         "PROGRAM": unit_word(shutil.which("shapechanger") or f"{sys.prefix}/bin/shapechanger"),
         "USER": user or getpass.getuser(),
@@ -192,16 +188,6 @@ class Machine:
         """Return whether config.txt enables a parameter of the device tree, such as "i2c"."""
         return self.settings().get(f"dtparam.{parameter}") in {"on", "1", "true", "yes"}
 
-    def finds_camera(self) -> bool:
-        """Return whether a camera on the ribbon cable is detected, or named by its overlay."""
-        found = self.settings()
-        return found.get("camera_auto_detect") == "1" or any(k.startswith(_CAMERAS) for k in found)
-
-    def i2c_hz(self) -> int:
-        """Return the speed of the I2C bus in config.txt, bits per second; 0 without one."""
-        speed = self.settings().get("dtparam.i2c_baudrate", "")
-        return int(speed) if speed.isdecimal() else 0
-
     def require_systemd(self) -> None:
         """Refuse a machine that systemd does not manage (sd_booted(3))."""
         if not (self.root / "run/systemd/system").is_dir():
@@ -232,36 +218,28 @@ class SystemChange:
     restarts: bool = False  # Whether it takes effect only when the computer restarts.
 
 
-class Outcome(NamedTuple):
-    """Result of one change."""
-
-    change: SystemChange
-    level: Literal["did", "already", "would", "FAILED"]
-    sentence: str
-
-
 def make_changes(
     changes: Iterable[SystemChange], run: Callable[[RootCommand], str], *, dry: bool = False
-) -> Iterator[Outcome]:
+) -> Iterator[tuple[SystemChange, Literal["did", "already", "would", "FAILED"], str]]:
     """Make each change that is not made yet, in order; if `dry`, only report the commands.
 
-    Commands run as root by `run`; see `Machine.run`. A generator of changes is resumed after each
-    change, so it can check the effects.
+    Yield each change with its level and a sentence. Commands run as root by `run`; see
+    `Machine.run`. A generator of changes is resumed after each change, so it can check the effects.
     """
     for change in changes:
         typed = " && ".join(map(str, change.commands))
         if change.is_made():
-            yield Outcome(change, "already", change.state)
+            yield change, "already", change.state
         elif not change.commands:
-            yield Outcome(change, "FAILED", change.instead)
+            yield change, "FAILED", change.instead
         elif dry:
-            yield Outcome(change, "would", typed)
+            yield change, "would", typed
         else:
             why = next((why for command in change.commands if (why := run(command))), "")
             if not why and not change.is_made():
                 why = "the command had no effect"
             sentence = f"{why}. By hand: {typed}" if why else change.state
-            yield Outcome(change, "FAILED" if why else "did", sentence)
+            yield change, "FAILED" if why else "did", sentence
 
 
 def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
@@ -349,10 +327,21 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
             yield SystemChange(f"I2C bus {bus}", state, exists, instead=reason)
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
         state, text = f"The I2C bus has {_FAST_HZ} bits per second.", f"i2c_arm_baudrate={_FAST_HZ}"
-        yield line("I2C speed", state, f"dtparam={text}", lambda: machine.i2c_hz() >= _FAST_HZ)
+
+        def is_fast() -> bool:
+            speed = machine.settings().get("dtparam.i2c_baudrate", "")
+            return speed.isdecimal() and int(speed) >= _FAST_HZ
+
+        yield line("I2C speed", state, f"dtparam={text}", is_fast)
     if has_ribbon(profile):
-        state = "The camera on the ribbon cable is detected."
-        yield line("camera detection", state, "camera_auto_detect=1", machine.finds_camera)
+        state = "The camera on the ribbon cable is detected, or named by its overlay."
+
+        def finds_camera() -> bool:
+            found = machine.settings()
+            is_auto = found.get("camera_auto_detect") == "1"
+            return is_auto or any(key.startswith(_CAMERAS) for key in found)
+
+        yield line("camera detection", state, "camera_auto_detect=1", finds_camera)
         package = machine.root / "usr/lib/python3/dist-packages/picamera2"
         install = _root("apt-get install -y python3-picamera2")
         state = "python3-picamera2 is installed."
