@@ -176,14 +176,8 @@ class RobotClient(Inbox):
     def suggest(self, values: Sequence[float], *, answers: int) -> int:
         """Send a suggestion while another client has control; the robot only shows it.
 
-        A suggestion expires like a command, and also requests the next observation.
-
-        Args:
-            values: One number for each action of the robot, in the order of its action layout.
-            answers: `seq` of the observation that the suggestion answers.
-
-        Returns:
-            The number of the suggestion, for `refusal`.
+        It has the arguments of `command`, expires like a command, and also requests the next
+        observation. The result is its number, for `refusal`.
         """
         seq = next(self._numbers)
         self._post(messages.Suggest(seq=seq, answers=answers, values=tuple(map(float, values))))
@@ -200,12 +194,7 @@ class RobotClient(Inbox):
         return self.observation(seq)
 
     def exchange(self, values: Sequence[float], seen: Received) -> Received:
-        """Send a command, and wait for the next observation.
-
-        Args:
-            values: One number for each action of the robot, in the order of its action layout.
-            seen: The observation that the command answers.
-        """
+        """Send a command in answer to the observation `seen`, and wait for the next one."""
         self.command(values, answers=seen.message.seq)
         return self.observation(seen.message.seq)
 
@@ -222,11 +211,7 @@ class RobotClient(Inbox):
         self._post(messages.Release())
 
     def record(self, on: bool = True, name: str = "") -> messages.RecorderState:
-        """Begin or end an episode on the robot's disk; only as a person.
-
-        Args:
-            on: Whether to record.
-            name: Title of the episode.
+        """Begin or end an episode, with a title, on the robot's disk; only as a person.
 
         Raises:
             RobotRefused: If the robot cannot record, for example on a full disk, or records
@@ -239,27 +224,20 @@ class RobotClient(Inbox):
         )
 
     def mark(self, text: str = "") -> messages.RecorderState:
-        """Mark the newest step of the episode being recorded; raises as `record` does."""
+        """Mark the newest step of the episode being recorded; raises as `record`."""
         before = self.recorder.marks if self.recorder else 0
         return self._ask(
             messages.Mark(text=text), messages.RecorderState, lambda state: state.marks > before
         )
 
     def undo(self, seconds: float = 5.0) -> messages.RecorderState:
-        """Drop the newest steps of the episode being recorded; raises as `record` does.
-
-        Args:
-            seconds: How far back, s, above 0.
-        """
+        """Drop the newest seconds, above 0, of the episode being recorded; raises as `record`."""
         before = self.recorder.dropped if self.recorder else 0
         undo = messages.Undo(seconds=seconds)
         return self._ask(undo, messages.RecorderState, lambda state: state.dropped > before)
 
     def browse(self, before: str = "") -> messages.Recordings:
-        """List the episodes on the robot, newest first.
-
-        Args:
-            before: Only episodes whose id sorts before this one; "" for the newest.
+        """List the episodes on the robot, newest first; only ids that sort before `before`, if any.
 
         Raises:
             RobotRefused: If the robot has no folder for recordings.
@@ -267,22 +245,15 @@ class RobotClient(Inbox):
         return self._ask(messages.Browse(before=before), messages.Recordings)
 
     def fetch(self, episode: str, first: int = 0, count: int = 1_000) -> messages.Piece:
-        """Read a part of an episode on the robot's disk; raises as `browse` does.
+        """Read lines, from 0, of the episode with an id on the robot's disk; raises as `browse`.
 
-        Args:
-            episode: Id of the episode.
-            first: Number of the first line, from 0.
-            count: Most lines to read; fewer are sent if the message would be too large.
+        Fewer than `count` lines are sent if the message would be too large.
         """
         request = messages.Fetch(episode=episode, first=first, count=count)
         return self._ask(request, messages.Piece)
 
     def ping(self) -> tuple[float, int]:
-        """Measure the round trip.
-
-        Returns:
-            The round trip, s, and the robot's time at its answer, ns.
-        """
+        """Return the round-trip time, s, and the robot's time at its answer, ns."""
         start = time.monotonic()
         pong = self._ask(messages.Ping(), messages.Pong)
         return time.monotonic() - start, pong.now_ns

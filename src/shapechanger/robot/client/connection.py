@@ -217,7 +217,6 @@ class Inbox:
 
         Raises:
             StaleObservation: If none arrives in time.
-            LinkError: If the link is lost.
         """
         limit_s = self._patience_s if timeout_s is None else timeout_s
         found = self.wait(lambda: self.newest if self.seq > newer_than else None, limit_s)

@@ -24,14 +24,11 @@ _BRIGHTEST: Final = 255
 
 
 def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Resize an image.
+    """Resize an image to width and height, pixels; return it as it is if it has this size.
 
     If width and height shrink by whole numbers, each pixel is the rounded mean of its box.
     Otherwise each pixel is the nearest pixel of the original. Nothing is cropped, so a change of
     proportions stretches the image.
-
-    Returns:
-        Shape (size[1], size[0], 3); the image itself if it has this size.
     """
     height, width = picture.shape[:2]
     wide, high = size
@@ -112,10 +109,9 @@ class RobotSpaces:
         return tuple(min(max(0.0, f.low), f.high) for f in self.action_layout)
 
     def quantity(self, message: Observation, *names: str) -> tuple[float | None, str]:
-        """Return the first quantity of these names that is measured.
+        """Return the first measured quantity of these names, or None, and its source.
 
-        Returns:
-            Its value, or None; and its source: name of the sensor, "estimated" or "absent".
+        The source is the name of the sensor, "estimated" or "absent".
         """
         for name in names:
             source = message.sources.get(name, _ABSENT)

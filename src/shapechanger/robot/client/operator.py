@@ -145,11 +145,7 @@ class Takeover:
         self._waits = False
 
     def act(self, robot: RobotClient, values: tuple[float, ...], last: Observation) -> int:
-        """Send a command, or a suggestion while another client has control.
-
-        Returns:
-            Number of the command or suggestion.
-        """
+        """Send a command, or a suggestion while another client has control; return its number."""
         if not self._allowed or last.mine:
             return robot.command(values, answers=last.seq)
         if not last.holder:

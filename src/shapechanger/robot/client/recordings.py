@@ -61,13 +61,10 @@ def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[Episo
 
 
 def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
-    """Download one episode, or the new part of it.
+    """Download one episode, or its new part; count the new lines, and the edits made here.
 
     An incomplete episode is kept in a folder that readers ignore. Marks and edits from this machine
-    are placed after those from the robot, so that they take precedence.
-
-    Returns:
-        Number of new lines from the robot, and number of marks and edits made on this machine.
+    are placed after the robot's, so that they take precedence.
     """
     here, part = data / name, data / f".{name}.fetching"
     folder = here if is_episode(here) else part

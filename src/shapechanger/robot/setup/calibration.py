@@ -100,10 +100,8 @@ def find_joint_zeros(
 ) -> dict[str, int]:
     """Average the encoder readings while a person holds the joints straight.
 
-    `wait` waits for about 10 ms.
-
-    Returns:
-        Counts of each encoder, 0 to 4095, keyed by sensor and joint, such as `joints.MCP_flexion`.
+    `wait` waits for about 10 ms. The results are counts, 0 to 4095, keyed by sensor and joint, such
+    as `joints.MCP_flexion`.
     """
     zeros: dict[str, int] = {}
     counts_per_rad = COUNTS_PER_TURN / (2.0 * math.pi)
@@ -121,10 +119,7 @@ def find_joint_zeros(
 
 
 def require_homing(settings: BusSettings) -> None:
-    """Refuse a homing tension below the gears' measured friction.
-
-    The servo would stop immediately, with a slack tendon.
-    """
+    """Refuse a tension below the gears' measured friction: the tendon would stay slack."""
     for servo in settings.servos:
         pull, friction = servo.homing_n, servo.known.friction_nm / servo.spool_radius_m
         if servo.known.is_measured and pull <= friction:
@@ -138,33 +133,28 @@ def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
     """Pull all tendons until all servos stand still; the finger must be in a known posture.
 
     This also takes up slack. The servos must have been enabled by `ServoBus.hold`. `cycle` sends
-    the requested tensions, runs a cycle, and returns its time, ns.
-
-    Returns:
-        Position of each servo at the zero of its tendon, in counts, keyed by name.
-
-    Raises:
-        RobotError: If a servo fails, or winds in too far or for too long.
+    the requested tensions, runs a cycle, and returns its time, ns. The results are the positions at
+    the zeros of the tendons, in counts, keyed by the servos' names.
     """
     servos = {one.settings.name: one for one in bus.servos.values()}
     starts: dict[str, int] = {}
     moved: dict[str, tuple[int, int]] = {}  # Position and time at which each last moved.
-    began_ns: int | None = None
     for one in servos.values():
         one.request(one.settings.homing_n)
+    began_ns = now_ns = cycle()
     while True:
-        now_ns = cycle()
         if bus.reason:
             raise RobotError(f"No zero: {bus.reason}")
-        began_ns = now_ns if began_ns is None else began_ns
         for name, one in servos.items():
             if one.missed:
                 continue
             servo, at = one.settings, one.position
             wound_m = (starts.setdefault(name, at) - at) * servo.metre_per_count
             if wound_m > _TRAVEL_M:
-                reason = f"it was wound in by {1e3 * wound_m:.0f} mm without resistance"
-                raise RobotError(f"{servo.label} has no zero: {reason}. Its tendon has come off.")
+                raise RobotError(
+                    f"{servo.label} has no zero: it was wound in by {1e3 * wound_m:.0f} mm without "
+                    "resistance. Its tendon has come off."
+                )
             was_at, _ = moved.setdefault(name, (at, now_ns))
             if abs((at - was_at) * servo.metre_per_count) > _STILL_M:
                 moved[name] = at, now_ns
@@ -175,15 +165,14 @@ def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
         if now_ns - began_ns > _WITHIN_MS * 1_000_000:
             names = ", ".join(moving)
             raise RobotError(f"No zero: {names} still moved after {_WITHIN_MS / 1e3:g} s.")
+        now_ns = cycle()
 
 
 def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) -> dict[str, int]:
-    """Pull all tendons gently until nothing moves, and release them; see `find_joint_zeros`.
+    """Pull all tendons gently until nothing moves, release them, and return what `home` found.
 
-    A person holds the finger straight, and no other process may have the bus open.
-
-    Returns:
-        Position of each servo, counts, keyed by the name of its output.
+    A person holds the finger straight, and no other process may have the bus open. `wait` waits for
+    about 10 ms.
     """
     outputs = [output for output in plan.outputs if output.driver == DRIVER]
     if not outputs:
