@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 _PACKAGE: Final = "shapechanger"
 # Extras that combine others, or are for developers of Shapechanger.
 _NOT_LISTED: Final = ("all", "dev")
-# Time limit for rendering one image, s.
-_PATIENCE_S: Final = 120
+_PATIENCE_S: Final = 120  # Time limit of a check, s; rendering the first image is slow.
 # Runs in a separate process, because a broken OpenGL driver ends its process.
 _DRAW: Final = """
 from shapechanger.envs.opengl import choose_gl
@@ -73,16 +72,13 @@ def examine_machine(
             return ""
 
     checks = [
-        ("machine", _machine()),
-        *(
-            (f"extra {extra}" if extra else "core", _extra(parsed, extra, installed))
-            for extra in ("", *extras)
-        ),
+        *(("machine", _machine()), ("core", _extra(parsed, "", installed))),
+        *((f"extra {extra}", _extra(parsed, extra, installed)) for extra in extras),
         # The check of its extra reports a package that is not installed.
         *((name, check()) for name, package, check in _PACKAGES if installed(package)),
         ("pins", _gpio(dev)),
     ]
-    return run_checks(checks)
+    return run_checks(checks, _PATIENCE_S)
 
 
 def _machine() -> Results:
@@ -119,12 +115,9 @@ def _extra(parsed: Sequence[Requirement], extra: str, installed: Callable[[str],
 
 def _drawing() -> Results:
     """Check whether MuJoCo can render an image, and report the OpenGL library."""
+    command = [sys.executable, "-c", _DRAW]
     done = subprocess.run(
-        [sys.executable, "-c", _DRAW],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=_PATIENCE_S,
+        command, capture_output=True, text=True, check=False, timeout=_PATIENCE_S - 1
     )
     if done.returncode == 0:
         yield "good", f"Drew {done.stdout.strip().splitlines()[-1]}."
@@ -162,9 +155,7 @@ def _gpio(dev: Path) -> Results:
         yield "bad", f"No permission to open {chips[0]}: {remedy}."
 
 
+# Checks of packages: name, package, function.
 _PACKAGES: Final = (
-    ("images", "mujoco", _drawing),
-    ("torch", "torch", _torch),
-    ("warp", "warp-lang", _warp),
+    *(("images", "mujoco", _drawing), ("torch", "torch", _torch), ("warp", "warp-lang", _warp)),
 )
-"""Checks of packages that are installed: name, package, function."""

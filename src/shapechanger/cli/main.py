@@ -65,7 +65,7 @@ COMMANDS: Final = Group(
             {"envs": ("list", "show", "compare", "check", "render")},
         ),
         "train": "train:Train",
-        "play": "play:Play",
+        "play": "policies:Play",
         "transfer": "transfer:Transfer",
         "suite": _group(
             "suite",

@@ -20,7 +20,7 @@ from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import can_open, open_console, recall
-from shapechanger.robot.client.recordings import begin_recording, end_recording, fetch_episode
+from shapechanger.robot.client.recordings import end_recording, episodes_there, fetch_episode
 from shapechanger.robot.client.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
 from shapechanger.robot.link.messages import Observation
 from shapechanger.vehicles.remote.pilot import PolicyDriver, require_fit
@@ -87,7 +87,8 @@ class RobotDrive:
 @contextlib.contextmanager
 def recorded_to(data: Path, robot: RobotClient, name: str) -> Generator[None]:
     """Record on the robot for the duration of a block; after an error, print how to fetch it."""
-    before = begin_recording(robot)
+    before = {episode.id for episode in episodes_there(robot)}
+    robot.record(on=True)
     try:
         yield
         for episode in end_recording(robot, before):

@@ -13,9 +13,7 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from itertools import chain, count
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from threading import Thread
-from time import monotonic
 from typing import Final, Literal, NamedTuple
 
 from shapechanger.errors import OutputError, ShapechangerError, translate_errors
@@ -43,45 +41,30 @@ def judged(good: bool, sentence: str, otherwise: str = "") -> Result:
     return ("good", sentence) if good else ("bad", otherwise or sentence)
 
 
-def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding]:
-    """Yield the findings of checks.
+def run_checks(checks: Checks, limit_s: float) -> Iterator[Finding]:
+    """Yield the findings of checks, each of which has ended, failed, or taken `limit_s` seconds.
 
-    With a limit, the next check begins after any error or after `limit_s` seconds. Without a limit,
-    an error ends all checks, because a check may depend on the previous ones.
+    Each check runs in a separate thread, which is abandoned if its driver hangs.
     """
     for name, results in checks:
-        limited = results if limit_s is None else _finish_in_time(results, limit_s)
-        yield from (Finding(name, *result) for result in limited)
+        found: list[Result] = []
+        thread = Thread(target=_collect, args=(results, found), name="check", daemon=True)
+        thread.start()
+        thread.join(limit_s)
+        if thread.is_alive():
+            why = f"No answer within {limit_s:g} s: its device or driver hangs. Look at its wires "
+            found = [*found, ("bad", f"{why}and supply, restart the computer, and check again.")]
+        yield from (Finding(name, *result) for result in found)
 
 
-def _finish_in_time(results: Results, limit_s: float) -> Results:
-    """Yield the results of a check until it ends, fails, or has taken `limit_s` seconds.
-
-    The check runs in a separate thread, which is abandoned if its driver hangs.
-    """
-    found: SimpleQueue[Result | None] = SimpleQueue()
-
-    def run() -> None:
-        try:
-            for result in results:
-                found.put(result)
-        except ShapechangerError as error:
-            found.put(("bad", str(error)))
-        except Exception as error:  # Any error of a driver is a finding.
-            found.put(("bad", f"The check fails: {type(error).__name__}: {error}."))
-        found.put(None)
-
-    Thread(target=run, name="check", daemon=True).start()
-    until_s = monotonic() + limit_s
+def _collect(results: Results, found: list[Result]) -> None:
     try:
-        while result := found.get(timeout=max(0.0, until_s - monotonic())):
-            yield result
-    except Empty:
-        yield (
-            "bad",
-            f"No answer within {limit_s:g} s: its device or driver hangs. Look at its wires and "
-            "supply, restart the computer, and check again.",
-        )
+        for result in results:
+            found.append(result)
+    except ShapechangerError as error:
+        found.append(("bad", str(error)))
+    except Exception as error:  # Any error of a driver is a finding.
+        found.append(("bad", f"The check fails: {type(error).__name__}: {error}."))
 
 
 def facts(profile: Profile, *, twin: bool, root: Path = Path("/")) -> list[str]:

@@ -155,13 +155,6 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
     return lines
 
 
-def begin_recording(robot: RobotClient) -> set[str]:
-    """Begin to record on a robot, as a person, and return the ids of the episodes before."""
-    before = {episode.id for episode in episodes_there(robot)}
-    robot.record(on=True)
-    return before
-
-
 def end_recording(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
     """End a recording, if it has not ended by itself, and return its episodes."""
     state = robot.recorder
