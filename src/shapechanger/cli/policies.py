@@ -36,25 +36,14 @@ from shapechanger.envs.catalogue import (
     env_ref,
 )
 from shapechanger.envs.opengl import has_screen
-from shapechanger.errors import (
-    HubError,
-    PolicyError,
-    ShapechangerError,
-    StudyError,
-    check_seed,
-)
+from shapechanger.errors import HubError, PolicyError, ShapechangerError, StudyError, check_seed
 from shapechanger.files import require_file, write_atomic
 from shapechanger.identity import identify_env, texts_in
 from shapechanger.policy import MAX_BYTES, STEERING, CloneNetwork, PolicyCard, load_policy
 from shapechanger.reports.films import require_film, write_film
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.identities import ENV, known, require_same_env, single_body
-from shapechanger.transfer.learners.evaluation import (
-    EVALUATION_SEED,
-    Act,
-    evaluate,
-    random_actions,
-)
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act, evaluate, random_actions
 from shapechanger.transfer.references import load_references
 from shapechanger.vehicles.expert import PERIOD_S
 

@@ -22,12 +22,7 @@ from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 from shapechanger.transfer.report.study import write_study_report
-from shapechanger.transfer.report.verdict import (
-    measure_rows,
-    other_arms,
-    verdict,
-    weak_individuals,
-)
+from shapechanger.transfer.report.verdict import measure_rows, other_arms, verdict, weak_individuals
 from shapechanger.transfer.study import (
     Study,
     default_arms,

@@ -43,9 +43,7 @@ _Data = Annotated[
     tyro.conf.arg(metavar="DATA", help="Folder of the recording, or of one episode."),
 ]
 _Episode = Annotated[
-    Path,
-    tyro.conf.Positional,
-    tyro.conf.arg(metavar="EPISODE", help="Folder of the episode."),
+    Path, tyro.conf.Positional, tyro.conf.arg(metavar="EPISODE", help="Folder of the episode.")
 ]
 _From = Annotated[int | None, tyro.conf.arg(name="from", metavar="STEP")]
 _To = Annotated[int | None, tyro.conf.arg(name="to", metavar="STEP")]
@@ -292,12 +290,7 @@ class DemosImport:
     def run(self) -> None:
         """Import and print a summary; exit with 3 if something was left out."""
         done = import_recording(
-            self.source,
-            self.out,
-            self.format,
-            camera=self.camera,
-            hz=self.hz,
-            strict=self.strict,
+            self.source, self.out, self.format, camera=self.camera, hz=self.hz, strict=self.strict
         )
         say(
             f"read {self.source} ({done.format}): {counted(done.episodes, 'episode')}, "
@@ -390,10 +383,7 @@ class DemosPull:
     def run(self) -> None:
         if not 0.0 < self.max_gib < float("inf"):
             raise HubError(f"--max-gib must be above 0, got {self.max_gib}.")
-        with (
-            new_folder(self.out) as folder,
-            tempfile.TemporaryDirectory(dir=folder) as place,
-        ):
+        with new_folder(self.out) as folder, tempfile.TemporaryDirectory(dir=folder) as place:
             commit = hub.pull(
                 self.repo,
                 "demonstrations",

@@ -21,14 +21,7 @@ from shapechanger.contract.plan import GuardPlan, SensorPlan, driven_pins
 from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan, open_camera
 from shapechanger.robot.check.pins import outside_level, pin_level
-from shapechanger.robot.check.report import (
-    Checks,
-    Finding,
-    Result,
-    Results,
-    judged,
-    run_checks,
-)
+from shapechanger.robot.check.report import Checks, Finding, Result, Results, judged, run_checks
 from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
 from shapechanger.robot.drivers.as5600 import As5600
 from shapechanger.robot.drivers.chip import SENSORS, device_errors
