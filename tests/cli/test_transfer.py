@@ -51,9 +51,7 @@ def quick(
     return out, run(*QUICK, "--out", str(out))
 
 
-def test_a_study_is_one_command(
-    quick: tuple[Path, subprocess.CompletedProcess[str]],
-) -> None:
+def test_a_study_is_one_command(quick: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
     """The command writes study.json and a self-contained report, and a line for each run."""
     out, done = quick
     assert done.returncode == 0, done.stderr

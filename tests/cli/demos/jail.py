@@ -20,10 +20,7 @@ import pyarrow.parquet  # noqa: F401
 import simplejpeg  # noqa: F401
 
 from shapechanger.cli import main
-from shapechanger.demos import (  # noqa: F401
-    recording,
-    report,
-)
+from shapechanger.demos import recording, report  # noqa: F401
 from shapechanger.demos.cloning import learn  # noqa: F401
 from shapechanger.demos.exchange import import_recording  # noqa: F401
 

@@ -349,8 +349,7 @@ DATASETS: Spoilt = {
     "10^12 steps": (stored(REWARDS, endless), "claims at least"),
     "10^12 values in a step": (
         stored(
-            ACTIONS,
-            lambda f, at: f.create_dataset(at, (5, 1 << 40), "f8", chunks=(1, 1 << 10)),
+            ACTIONS, lambda f, at: f.create_dataset(at, (5, 1 << 40), "f8", chunks=(1, 1 << 10))
         ),
         "bytes: too many",
     ),

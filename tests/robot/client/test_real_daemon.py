@@ -40,10 +40,7 @@ class Served:
         self.known_at = made.fingerprint.hex()
         self.key = made.key
         self._plan = car_plan(
-            credentials=str(folder),
-            state_layout=Layout(STATE).to_json(),
-            control_hz=HZ,
-            **plan,
+            credentials=str(folder), state_layout=Layout(STATE).to_json(), control_hz=HZ, **plan
         )
         self._monkeypatch = monkeypatch
         self._ready = threading.Event()
