@@ -17,12 +17,7 @@ class Printed(NamedTuple):
 
 
 class Cli:
-    """The command `shapechanger`, or a group of its commands.
-
-    Args:
-        capsys: Fixture that captures the output.
-        group: The first words of each command.
-    """
+    """The command `shapechanger`, or a group of its commands, with the same first words."""
 
     def __init__(self, capsys: pytest.CaptureFixture[str], *group: str) -> None:
         self._capsys = capsys
@@ -41,7 +36,6 @@ class Cli:
         return printed
 
     def output(self, *words: object) -> str:
-        """Return the standard output of a command that succeeds."""
         return self.ended(0, *words).out
 
     def refused(self, *words: object) -> str:

@@ -25,7 +25,6 @@ pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
 @pytest.fixture(autouse=True)
 def short_films(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Limit films to half a second."""
     monkeypatch.setattr("shapechanger.envs.study_films._FILM_S", 0.5)
 
 

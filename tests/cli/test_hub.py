@@ -52,7 +52,6 @@ Run = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[FakeHub]:
-    """A Hub for all tests."""
     with serve_hub() as server:
         yield server
 
@@ -104,7 +103,6 @@ def run(environment: dict[str, str]) -> Iterator[Run]:
 
 
 def refused(answer: tuple[int, str, str]) -> str:
-    """Check that a command has refused its input, and return its error."""
     code, output, errors = answer
     assert code == 2, errors
     assert output == ""
@@ -190,7 +188,6 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
 
 
 def listing(files: dict[str, bytes], kind: str = "policy") -> bytes:
-    """Return a `shapechanger.json` with the right sizes and hashes."""
     about = {
         name: {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
         for name, content in files.items()
@@ -279,23 +276,16 @@ READER = "hf_reader"  # Token that may read only.
 
 @dataclass
 class Repository:
-    """A repository.
-
-    Attributes:
-        private: Whether only its owner can see it.
-        commits: Files of each commit, by the hash of the commit, oldest first.
-    """
+    """A repository, with the files of each commit keyed by its hash, oldest first."""
 
     private: bool = False
     commits: dict[str, dict[str, bytes]] = field(default_factory=dict)
 
     @property
     def files(self) -> dict[str, bytes]:
-        """Files of the newest commit."""
         return next(reversed(self.commits.values()), {})
 
     def commit(self, files: dict[str, bytes]) -> str:
-        """Add a commit; return its hash."""
         text = repr((len(self.commits), sorted(files.items()))).encode()
         sha = hashlib.sha1(text).hexdigest()
         self.commits[sha] = files
@@ -303,36 +293,26 @@ class Repository:
 
 
 class FakeHub(ThreadingHTTPServer):
-    """The server.
-
-    Attributes:
-        repositories: Repositories by their type and name, such as "models/ada/ant".
-        requests: Method and path of each request.
-        cut: Number of bytes after which transfers of a file end, keyed by the file's name.
-        stalled: Names of files whose transfers stop half-way until the server ends.
-        stalling: Whether such a transfer is under way.
-    """
+    """A Hub on this machine."""
 
     daemon_threads = True
 
     def __init__(self) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.repositories: dict[str, Repository] = {}
-        self.requests: list[str] = []
-        self.cut: dict[str, int] = {}
-        self.stalled: set[str] = set()
-        self.stalling = threading.Event()
+        self.repositories: dict[str, Repository] = {}  # Keyed by name, such as "models/ada/ant".
+        self.requests: list[str] = []  # Methods and paths.
+        self.cut: dict[str, int] = {}  # Bytes after which the transfer of a file ends.
+        self.stalled: set[str] = set()  # Files whose transfers stop half-way until the server ends.
+        self.stalling = threading.Event()  # Set while such a transfer is under way.
         self.released = threading.Event()
 
     @property
     def address(self) -> str:
-        """URL of the fake Hub, for HF_ENDPOINT."""
         return f"http://127.0.0.1:{self.server_address[1]}"
 
 
 @contextlib.contextmanager
 def serve_hub() -> Iterator[FakeHub]:
-    """Serve an empty Hub on a free port."""
     with FakeHub() as hub:
         thread = threading.Thread(target=hub.serve_forever, daemon=True)
         thread.start()

@@ -30,7 +30,6 @@ def _zip(path: Path, env: str = "shapechanger/InvertedPendulum-v1", **arguments:
 
 
 def _convert(folder: Path, env: str = "InvertedPendulum") -> tuple[object, ...]:
-    """Return the arguments of the command that converts the zip of `_zip`."""
     return "policies", "convert", folder / "mine.zip", env
 
 
@@ -115,7 +114,6 @@ def test_a_zip_needs_trust_and_an_env_that_fits(tmp_path: Path, cli: Cli) -> Non
 
 @pytest.fixture
 def trained(tmp_path: Path, cli: Cli) -> Path:
-    """A pendulum policy in its own folder."""
     _zip(tmp_path / "mine.zip", policy_kwargs={"net_arch": [8]})
     out = tmp_path / "policies" / "mine.safetensors"
     out.parent.mkdir()

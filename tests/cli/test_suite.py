@@ -33,14 +33,7 @@ _PAIRS += [f"{a}-to-{b}" for a, b in (("Wet", "Icy"), ("Icy", "Dry"), ("Icy", "W
 
 
 class _Counting(Serial):
-    """Executor that records jobs and can stop early.
-
-    Attributes:
-        done: Names of the jobs, in order.
-
-    Args:
-        stops_after: Number of jobs after which Ctrl-C is raised; None for never.
-    """
+    """Executor that records the names of jobs, and raises Ctrl-C after a number of jobs, if any."""
 
     def __init__(self, stops_after: int | None = None) -> None:
         self.done: list[str] = []
@@ -68,7 +61,6 @@ def lanes() -> Iterator[None]:
 def _run(
     out: Path, counting: _Counting, *more: str, arguments: Sequence[str] = _SUITE
 ) -> tuple[int, str, str]:
-    """Return exit code, standard output and standard error."""
     typed = [*arguments, "--out", str(out), *more]
     output, errors, code = io.StringIO(), io.StringIO(), 0
     with (
@@ -87,7 +79,6 @@ def _run(
 
 @pytest.fixture(scope="module")
 def complete_suite(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, _Counting, str]:
-    """A complete suite: its folder, executor and output."""
     out, counting = tmp_path_factory.mktemp("suite") / "all", _Counting()
     code, output, errors = _run(out, counting)
     assert code == 0, errors
@@ -138,7 +129,6 @@ class _Failing(_Counting):
     """Executor with a failing run in every study."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Count the study, and fail."""
         self.done.append(jobs[0].name)
         raise FailedRuns("These runs failed: source-0 (broken).")
 

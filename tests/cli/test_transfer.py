@@ -25,14 +25,12 @@ QUICK = ["transfer", "InvertedPendulum", "BigInvertedPendulum", "--quick"]
 
 
 def run(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
-    """Run a command in a separate process."""
     return subprocess.run(  # type: ignore[call-overload]
         [*COMMAND, *arguments], capture_output=True, text=True, check=False, **options
     )
 
 
 def curves(out: Path) -> dict[str, list[tuple[int, float]]]:
-    """Return all learning curves of a study."""
     study = json.loads((out / "study.json").read_text())
     return {
         f"{r['run']['kind']}-{r['run']['index']}": [
@@ -68,7 +66,6 @@ def test_a_study_is_one_command(quick: tuple[Path, subprocess.CompletedProcess[s
 
 
 def _until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
-    """Wait for a condition, or for the end of the process."""
     end = time.monotonic() + 240.0
     while not condition():
         assert time.monotonic() < end, "waited too long"

@@ -26,8 +26,6 @@ def network() -> Iterator[Zeroconf]:
 
 
 class _Announced:
-    """Records announced services."""
-
     def __init__(self) -> None:
         self.services: list[Any] = []
         self.closed = False

@@ -54,7 +54,6 @@ def limited(arguments: list[str]) -> int:
 
 
 def run(arguments: list[str]) -> tuple[int, str]:
-    """Run a command in a separate process, and return its exit code and output."""
     ours, theirs = os.pipe()
     pid = os.fork()
     if pid == 0:

@@ -51,12 +51,10 @@ def data(tmp_path: Path) -> Path:
 
 
 def grey(value: int) -> bytes:
-    """Return a uniform grey JPEG of 40 x 30 pixels."""
     return simplejpeg.encode_jpeg(np.full((30, 40, 3), value, np.uint8))
 
 
 def episodes(data: Path) -> list[Path]:
-    """Return the folders of the episodes."""
     return sorted(path for path in data.iterdir() if path.is_dir())
 
 
@@ -352,7 +350,6 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _record(folder: Path, n: int, seed: int, layout: object = KEYS) -> Path:
-    """Record an episode as a person would drive it."""
     chosen = STEERS if layout is STEERS else KEYS
     data = stripes(n, seed, chosen)
     header = EpisodeHeader(action_layout=chosen, image_size=(50, 33), clock="none")

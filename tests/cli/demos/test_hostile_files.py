@@ -56,27 +56,22 @@ def jail() -> Iterator[Jail]:
 
 
 def sparse(path: Path, size: int) -> None:
-    """Make a sparse file of `size` bytes, which needs no disk space."""
     path.unlink(missing_ok=True)
     with path.open("wb") as file:
         file.truncate(size)
 
 
 def pipe(path: Path) -> None:
-    """Replace a file by a pipe without a writer."""
     path.unlink()
     os.mkfifo(path)
 
 
 def link(path: Path, target: str) -> None:
-    """Replace a file by a link."""
     path.unlink(missing_ok=True)
     path.symlink_to(target)
 
 
 def header_with(**fields: object) -> Callable[[Path], None]:
-    """Return a function that changes fields of an episode's header."""
-
     def change(episode: Path) -> None:
         path = episode / "episode.json"
         path.write_text(json.dumps(json.loads(path.read_text()) | fields))
@@ -98,8 +93,6 @@ def steps_with(**fields: object) -> Callable[[Path], None]:
 
 
 def added(line: dict[str, Any] | bytes) -> Callable[[Path], None]:
-    """Return a function that appends a line to the steps of an episode."""
-
     def change(episode: Path) -> None:
         with (episode / "steps.jsonl").open("ab") as file:
             file.write(line if isinstance(line, bytes) else encode_line(line))
@@ -108,7 +101,6 @@ def added(line: dict[str, Any] | bytes) -> Callable[[Path], None]:
 
 
 def nested(depth: int = 100_000) -> bytes:
-    """Return a line of deeply nested JSON with a valid checksum."""
     body = b'{"kind":' + b"[" * depth + b"]" * depth
     return body + b',"crc":"%08x"}\n' % binascii.crc32(body)
 
@@ -125,7 +117,6 @@ def test_a_picture_of_many_scans_is_refused() -> None:
 
 
 def refuse(answer: tuple[int, str]) -> str:
-    """Check that a command has refused its input, and return its error."""
     code, text = answer
     assert code == 2, text
     assert text.startswith("error: ")
@@ -206,7 +197,6 @@ def test_merge_does_not_follow_links(tmp_path: Path, jail: Jail, target: str) ->
 
 
 def edit(path: Path, old: str, new: str) -> None:
-    """Replace a text that a file must contain."""
     text = path.read_text()
     assert old in text, text
     path.write_text(text.replace(old, new))
@@ -249,7 +239,6 @@ def column(name: str, key: str, values: Callable[[int], object]) -> Callable[[Pa
 
 
 def many_rows(folder: Path) -> None:
-    """Repeat a row a million times, in a few kilobytes."""
     table = pq.read_table(folder / ROWS).take([0])
     part = pa.concat_tables([table] * 1000).combine_chunks()
     repeated = pa.concat_tables([part] * 1000)
@@ -302,7 +291,6 @@ ACTIONS = "episode_0/actions"
 
 
 def endless(file: h5py.File, place: str) -> None:
-    """Give all columns a declared length of 10^12 steps."""
     file.create_dataset(place, (1 << 40,), "f8", chunks=(1 << 10,))
     group = file["episode_0"]
     group.attrs["total_steps"] = 1 << 40
@@ -312,8 +300,6 @@ def endless(file: h5py.File, place: str) -> None:
 
 
 def stored(place: str, spoil: Callable[[h5py.File, str], object]) -> Callable[[Path], None]:
-    """Return a function that changes an array of a Minari dataset."""
-
     def change(folder: Path) -> None:
         with h5py.File(folder / "data/main_data.hdf5", "a") as file:
             del file[place]

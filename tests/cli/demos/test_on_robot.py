@@ -48,7 +48,6 @@ def forward(folder: Path, robot: RunningRobot, seconds: float, **changes: object
 
 
 def person(episode: Path, folder: Path) -> Person:
-    """Run the replay at a terminal."""
     arguments = ("demos", "replay", str(episode), "--robot", "car")
     return Person(arguments, folder, {"XDG_CONFIG_HOME": str(folder)})
 

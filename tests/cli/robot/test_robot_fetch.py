@@ -53,7 +53,6 @@ def robot(there: Path) -> Iterator[RobotClient]:
 
 
 def record(folder: Path, count: int = 40) -> Path:
-    """Record an episode on the robot."""
     with EpisodeWriter.create(folder, HEADER) as writer:
         for number in range(count):
             jpeg = picture(number) if number % 3 != 2 else None

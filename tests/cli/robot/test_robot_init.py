@@ -100,7 +100,6 @@ def test_with_arguments_no_question_is_asked(
 
 @pytest.fixture
 def pi(tmp_path: Path) -> FakePi:
-    """A fresh Raspberry Pi."""
     return FakePi(tmp_path / "pi")
 
 
@@ -117,8 +116,6 @@ Said = Callable[..., list[str]]
 
 @pytest.fixture
 def said(pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]) -> Said:
-    """Install the car with some options, and return the printed lines."""
-
     def run(**options: bool) -> list[str]:
         RobotInstall("rover.toml", **options).install(car, pi.machine)
         return capsys.readouterr().out.splitlines()

@@ -31,7 +31,6 @@ KEY = "F3KI-CLDB-JQNI-LWGB-LOBU-SJPT-5E"
 
 @pytest.fixture
 def robot(capsys: pytest.CaptureFixture[str]) -> Cli:
-    """The commands `shapechanger robot ...`."""
     return Cli(capsys, "robot")
 
 
@@ -58,7 +57,6 @@ def files(folder: Path) -> set[str]:
 
 
 def write_ready_profile(home: Path, text: str = CAR) -> str:
-    """Write the profile, key and certificate of a robot, and return the profile's name."""
     profile = write_profile(home / "work", text)
     make_credentials(home / "config" / "shapechanger" / "robots" / profile.name, profile.name)
     return str(profile.path)

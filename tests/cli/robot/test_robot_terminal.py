@@ -203,7 +203,6 @@ def test_killing_the_command_ends_its_robot(tmp_path: Path) -> None:
 
 
 def _below(pid: int) -> list[int]:
-    """Return the pids of all descendants of a process."""
     try:
         children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     except FileNotFoundError:
@@ -380,5 +379,4 @@ def test_recordings_are_kept_after_a_failure(
 
 
 def _is_corrected(seen: Observation) -> bool:
-    """Return whether a person drives while the policy suggests."""
     return seen.commanded[1:] == (0.5,) and bool(seen.suggested)

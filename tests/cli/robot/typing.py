@@ -16,13 +16,7 @@ _ESCAPES = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 
 
 class Person:
-    """Runs a command at a pseudo-terminal.
-
-    Args:
-        arguments: Arguments of `shapechanger`.
-        folder: Working folder.
-        variables: Additional environment variables.
-    """
+    """Runs a command at a pseudo-terminal, with more environment `variables`."""
 
     def __init__(
         self, arguments: tuple[str, ...], folder: Path, variables: Mapping[str, str] | None = None
@@ -44,11 +38,9 @@ class Person:
         self._reader.start()
 
     def __enter__(self) -> Self:
-        """Return the session."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Terminate the command."""
         if self.process.poll() is None:
             self.process.terminate()
         self.process.wait(20.0)
@@ -77,7 +69,6 @@ class Person:
             time.sleep(0.02)
 
     def end(self, seconds: float = 40.0) -> int:
-        """Wait for the command to exit, and return its exit code."""
         return self.process.wait(seconds)
 
     def _read(self) -> None:

@@ -138,7 +138,6 @@ def _hardware(where: str = "", act: Any = None) -> Any:
 
 @pytest.fixture
 def freed() -> Iterator[threading.Event]:
-    """An event that hanging methods wait for; it is set after the test."""
     event = threading.Event()
     yield event
     event.set()
@@ -182,8 +181,6 @@ def test_a_driver_that_hangs_or_fails_does_not_end_the_checks(
 
 
 class _Board(LocalBoard):
-    """A board whose time the checks advance."""
-
     def wait_until(self, until_ns: int) -> bool:
         self.advance(until_ns)
         return True

@@ -18,7 +18,6 @@ from tests.robot.client.robot import Robot, eventually
 
 @pytest.fixture(scope="session")
 def credentials(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder for the robot's key and certificate."""
     return tmp_path_factory.mktemp("credentials")
 
 
@@ -36,14 +35,12 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def run(credentials: Path) -> Iterator[Callable[..., Robot]]:
-    """Start a robot that is stopped after the test."""
     with contextlib.ExitStack() as stack:
         yield lambda **what: stack.enter_context(Robot(**what).running(credentials))
 
 
 @pytest.fixture
 def connect() -> Iterator[Callable[..., RobotClient]]:
-    """Connect to a robot; the connection is closed after the test."""
     with contextlib.ExitStack() as stack:
 
         def made(robot: Robot, **how: Any) -> RobotClient:

@@ -117,14 +117,12 @@ class Robot:
         return [message for message in self.messages if type(message) is kind]
 
     def stand_at(self, place: float) -> None:
-        """Move the robot to a place, m."""
         self._place = place
 
     # Serving.
 
     @contextlib.contextmanager
     def running(self, folder: Path, port: int = 0) -> Iterator[Robot]:
-        """Serve within the block."""
         self._credentials = make_credentials(folder, "tin")
         self._started.clear()
         thread = threading.Thread(target=lambda: asyncio.run(self._serve(port)))
@@ -145,8 +143,6 @@ class Robot:
                 socket._req.transport.abort()
 
     def send(self, message: Any) -> None:
-        """Send a message to all clients."""
-
         async def broadcast() -> None:
             for socket in self._sockets:
                 await socket.send_bytes(m.encode(message))

@@ -55,8 +55,6 @@ def made() -> Iterator[Made]:
 
 @pytest.fixture
 def started(made: Made) -> Made:
-    """Make the env of a robot, and begin an episode."""
-
     def start(robot: Robot, **how: Any) -> Any:
         env = made(robot, **how)
         env.reset(seed=0)

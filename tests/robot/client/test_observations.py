@@ -31,7 +31,6 @@ def test_shrinking_by_a_whole_number_keeps_the_mean(
 
 
 def spaces() -> RobotSpaces:
-    """Return the spaces of a robot with a camera and no sensors."""
     welcome = Robot(actions=(), state=(), image_size=(16, 12))._welcome()
     return RobotSpaces(welcome, (16, 12), image=True, state=False)
 

@@ -29,11 +29,7 @@ SENSED = {"speed": 0.5, "collision": 0.0, "stall": 0.0, "battery": 7.4}
 
 
 class Served:
-    """A daemon in its own thread.
-
-    Attributes:
-        running: The daemon, which may only be used on its event loop.
-    """
+    """A daemon in its own thread; `running` may only be used on its event loop."""
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **plan: Any) -> None:
         made = make_credentials(folder, "test car")
@@ -47,7 +43,6 @@ class Served:
 
     @contextlib.contextmanager
     def serving(self) -> Iterator[Served]:
-        """Serve until the end of the block."""
         thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
         thread.start()
         assert self._ready.wait(20.0)
@@ -82,7 +77,6 @@ class Served:
 
 @pytest.fixture
 def serve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Served]]:
-    """Start a daemon that is stopped after the test."""
     with contextlib.ExitStack() as stack:
 
         def made(**plan: Any) -> Served:
@@ -105,7 +99,6 @@ def test_arming_works_after_a_long_silence(serve: Callable[..., Served]) -> None
 
 @pytest.fixture
 def recorder(tmp_path: Path, serve: Callable[..., Served]) -> Served:
-    """A robot that keeps recordings."""
     return serve(recordings=str(tmp_path / "kept"), deadline_ms=60_000)
 
 

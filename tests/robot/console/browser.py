@@ -35,19 +35,11 @@ _PROVOKED: Final = ("net::ERR_", "WebSocket connection to")
 
 
 class Console:
-    """A page of the console in its own browser context.
+    """A page of the console in its own browser context, with options such as `PHONE`.
 
-    Args:
-        browser: The browser.
-        robot: The robot that serves the page.
-        key: Key in the page's address; None for the robot's key, "" for none.
-        script: Script to run before the scripts of the page.
-        options: Options of the browser's context, such as `PHONE`.
-
-    Attributes:
-        page: The page.
-        errors: Errors of the page's scripts and of the browser, such as policy violations.
-        sent: The messages that the page has sent to the robot.
+    `key` is in the page's address: None for the robot's key, "" for none. `script` runs before the
+    scripts of the page. `errors` has errors of the page's scripts and of the browser, such as
+    policy violations, and `sent` the messages that the page has sent to the robot.
     """
 
     def __init__(
@@ -75,11 +67,9 @@ class Console:
         self.page.goto(self.address + (f"#key={key}" if key else ""))
 
     def __enter__(self) -> Self:
-        """The console itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the page."""
         self._context.close()
 
     def _on_console(self, kind: str, text: str) -> None:
@@ -128,7 +118,6 @@ class Console:
         raise AssertionError(f"Nothing moved, though {key} was held.")
 
     def stop(self) -> None:
-        """Stop the robot, and wait until it has stopped."""
         self.page.keyboard.press("Space")
         self.await_state(robot="emergency")
 
@@ -146,10 +135,7 @@ class Pins:
     """The pins of a car's drive, read from the ledger of its twin.
 
     Unlike `read_ledger`, it reads each line once, because it is called often and the ledger of a
-    shared robot gets long.
-
-    Attributes:
-        rest_ns: Time at which the drive last came to rest, ns; 0 if it has not.
+    shared robot gets long. `rest_ns` is the time at which the drive last came to rest, or 0.
     """
 
     def __init__(self, robot: RunningRobot) -> None:

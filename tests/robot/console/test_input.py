@@ -32,11 +32,7 @@ _QUIET: Final = {"acknowledge", "ping", "hello"}
 
 
 class Input:
-    """Input of a person at a console, and the orders that the page sends for it.
-
-    Args:
-        console: The console.
-    """
+    """Input of a person at a console, and the orders that the page sends for it."""
 
     def __init__(self, console: Console) -> None:
         self.console = console

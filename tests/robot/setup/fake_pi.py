@@ -6,16 +6,9 @@ from shapechanger.robot.setup.install import Machine, RootCommand
 
 
 class FakePi:
-    """Files of a Raspberry Pi, and commands with their effects on them.
+    """Files of a Raspberry Pi below `root`, and commands with their effects on them.
 
-    Args:
-        root: Folder for its files.
-        config: Content of its config.txt; None for no such file.
-        groups: Its groups, which have no members.
-
-    Attributes:
-        ran: The commands so far, as typed.
-        refuses: Name of a program whose commands fail.
+    `config` is the content of its config.txt, None for no such file; its groups have no members.
     """
 
     def __init__(
@@ -25,8 +18,8 @@ class FakePi:
         groups: tuple[str, ...] = ("dialout", "gpio", "i2c", "video"),
     ) -> None:
         self.root = root
-        self.ran: list[str] = []
-        self.refuses = ""
+        self.ran: list[str] = []  # The commands so far, as typed.
+        self.refuses = ""  # Name of a program whose commands fail.
         self.write("proc/device-tree/model", "Raspberry Pi 4 Model B Rev 1.5\0")
         self.write("etc/group", "".join(f"{name}:x:1:\n" for name in groups))
         self.write("usr/lib/python3/dist-packages/picamera2/__init__.py", "")
@@ -39,7 +32,6 @@ class FakePi:
 
     @property
     def machine(self) -> Machine:
-        """The machine, for its user pi."""
         return Machine("pi", self.root, self.run)
 
     @property
@@ -52,7 +44,6 @@ class FakePi:
         path.write_text(text)
 
     def run(self, command: RootCommand) -> str:
-        """Run a command as root; see `Machine.run`."""
         self.ran.append(str(command))
         if command.arguments[0] == self.refuses:
             return f"{self.refuses}: permission denied"

@@ -40,7 +40,6 @@ def _levels(found: dict[str, tuple[str, str]]) -> dict[str, str]:
 
 @pytest.fixture
 def pi(tmp_path: Path) -> FakePi:
-    """A fresh Raspberry Pi."""
     return FakePi(tmp_path)
 
 

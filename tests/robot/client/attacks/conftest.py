@@ -17,7 +17,6 @@ from tests.robots import BLIND_CAR, IN_A_ROOM, changed, write_profile
 
 @pytest.fixture(scope="package")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
-    """A car without sensors, for all attacks."""
     folder = tmp_path_factory.mktemp("attacked")
     profile = write_profile(
         folder, changed("mix = { throttle = 1.0 }", f"mix = {{ throttle = {CAP} }}", BLIND_CAR)

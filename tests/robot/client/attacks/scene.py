@@ -28,17 +28,14 @@ class Scene:
     stack: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
 
     def stranger(self, **how: object) -> Stranger:
-        """Connect, without any request."""
         return self.stack.enter_context(Stranger(self.port, **how))
 
     def knock(self, key: bytes = WRONG, role: str = "program", **fields: object) -> str:
-        """Say hello, and return why the robot refuses."""
         stranger = self.stranger()
         stranger.hello(key, role, **fields)
         return stranger.refusal()
 
     def inside(self, role: str = "program", name: str = "thief") -> Stranger:
-        """Connect with the robot's key."""
         stranger = self.stranger()
         stranger.enter(self.key, role, name=name)
         return stranger

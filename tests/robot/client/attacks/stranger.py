@@ -26,7 +26,6 @@ def key_bytes(text: str) -> bytes:
 
 
 def proof(key: bytes, nonce: bytes, certificate: bytes, role: str) -> bytes:
-    """Return the answer to a challenge."""
     parts = (PURPOSE, nonce, certificate, role.encode())
     text = b"".join(struct.pack(">I", len(part)) + part for part in parts)
     return hmac.digest(key, text, "sha256")
@@ -48,12 +47,9 @@ def header(length: int, opcode: int = BINARY, *, end: bool = True) -> bytes:
 
 
 class Stranger:
-    """A TCP connection to a robot.
+    """A TCP connection from `source`, in 127.0.0.0/8, to a robot on 127.0.0.1.
 
-    Args:
-        port: Port of the robot on 127.0.0.1.
-        source: Address of the client, in 127.0.0.0/8.
-        version: Newest version of TLS that the client offers; None for plain TCP.
+    `version` is the newest version of TLS that the client offers; None for plain TCP.
     """
 
     def __init__(
@@ -85,11 +81,9 @@ class Stranger:
             self.certificate = hashlib.sha256(certificate or b"").digest()
 
     def __enter__(self) -> Self:
-        """Return the connection itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the connection without a closing handshake."""
         self._socket.close()
 
     # Bytes.
@@ -100,14 +94,12 @@ class Stranger:
             self._socket.sendall(data)
 
     def read(self, count: int) -> bytes:
-        """Return `count` bytes, fewer at the end of the stream."""
         while len(self._received) < count and (data := self._some()):
             self._received += data
         data, self._received = self._received[:count], self._received[count:]
         return data
 
     def rest(self) -> str:
-        """Return all data until the robot closes the connection."""
         while data := self._some():
             self._received += data
         return self._received.decode("latin-1")
@@ -153,7 +145,6 @@ class Stranger:
         return answer.decode("latin-1")
 
     def upgrade(self, path: str = "/link", **headers: str) -> str:
-        """Ask for a WebSocket, and return the status line."""
         wanted = {
             "Upgrade": "websocket",
             "Connection": "Upgrade",
@@ -186,7 +177,6 @@ class Stranger:
         self.write(frame(msgspec.msgpack.encode({"kind": kind, **fields})))
 
     def expect(self, kind: str) -> dict[str, Any]:
-        """Return the next message of a kind, and skip others."""
         while message := self.receive():
             if message["kind"] == kind:
                 return message
@@ -195,7 +185,6 @@ class Stranger:
     # The link.
 
     def challenge(self) -> bytes:
-        """Open the link, and return the nonce of the robot's challenge."""
         status = self.upgrade()
         assert "101" in status, status
         self.nonce = self.expect("challenge")["nonce"]
@@ -208,18 +197,15 @@ class Stranger:
         self.send("hello", **{"version": 1, "proof": self.proof, "role": role, **fields})
 
     def enter(self, key: bytes, role: str = "program", **fields: Any) -> dict[str, Any]:
-        """Say hello, and return the robot's welcome."""
         self.hello(key, role, **fields)
         return self.expect("welcome")
 
     def observe(self, after: int = 0) -> dict[str, Any]:
-        """Return a new observation."""
         self.send("acknowledge", seq=after)
         self.seen = self.expect("observation")
         return self.seen
 
     def take(self) -> dict[str, Any]:
-        """Ask for control, and return the answer."""
         self.send("take")
         return self.expect("lease")
 

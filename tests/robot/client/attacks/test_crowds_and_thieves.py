@@ -39,7 +39,6 @@ def half_a_request(scene: Scene, source: str) -> Stranger:
 
 
 def half_a_hello(scene: Scene, source: str) -> Stranger:
-    """Open the link, and send the beginning of a hello."""
     stranger = scene.stranger(source=source)
     stranger.challenge()
     stranger.write(header(100) + b"\x81\xa4kind")

@@ -156,8 +156,6 @@ ATTACKS.update(
 
 
 def by_a_thief(**fields: Any) -> Attack:
-    """Return an attack that commands with the key."""
-
     def attack(scene: Scene) -> str:
         thief = scene.inside()
         thief.drive(2**50, *FULL, **fields)
@@ -175,7 +173,6 @@ ATTACKS |= {
 
 @refused("sent already")
 def second_hello(scene: Scene) -> str:
-    """Send a second hello with another role."""
     thief = scene.inside()
     known = proof(scene.key, thief.nonce, thief.certificate, "person")
     thief.send("hello", version=1, proof=known, role="person")
