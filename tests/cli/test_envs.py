@@ -23,7 +23,6 @@ def test_list_names_every_env(cli: Cli) -> None:
 
 
 def test_show_prints_the_layout_as_a_table(cli: Cli) -> None:
-    """The table has names, units, ranges, elements and gains."""
     text = cli.output("envs", "show", "BigInvertedPendulum")
     for word in ("hinge/velocity", "rad/s", "-1.571", "joint slider", "100 N", "slide/motor"):
         assert word in text
@@ -70,7 +69,6 @@ def test_names_are_printed_as_they_are(cli: Cli) -> None:
 
 
 def test_the_bodies_of_odrl_are_one_row(cli: Cli) -> None:
-    """`envs list` lists the 84 bodies of ODRL only with --odrl."""
     text = cli.output("envs", "list")
     assert "80 targets of ODRL" in text
     assert "odrl-hopper-friction-0.1" not in text
@@ -90,7 +88,6 @@ def test_bodies_of_odrl_have_short_names(cli: Cli) -> None:
 
 
 def test_a_file_is_an_env(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file may have the built-in task or a task from a module, a body, and options."""
     (tmp_path / "dog.xml").write_text(DOG)
     (tmp_path / "tricks.py").write_text(
         "class Sit:\n    observe = ['back/angle']\n"

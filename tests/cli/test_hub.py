@@ -114,7 +114,6 @@ def refused(answer: tuple[int, str, str]) -> str:
 
 @pytest.mark.parametrize("file", [POLICY, CLONES["car"]])
 def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, file: Path) -> None:
-    """The pulled file is identical; the card describes the policy and how to pull it."""
     code, output, errors = run("policies", "push", file, "ada/reach")
     assert (code, errors) == (0, "")
     assert f"{hub.address}/ada/reach/commit/" in output
@@ -162,7 +161,6 @@ def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: 
 
 
 def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
-    """Unknown names, revisions and repositories, and missing and unsuitable tokens, are refused."""
     out = tmp_path / "out"
     pull = ("policies", "pull", "ada/none", "--out", out)
     push = ("policies", "push", POLICY, "ada/new")
@@ -228,7 +226,6 @@ def test_files_that_are_refused(
     listed: bytes,
     message: str,
 ) -> None:
-    """Sizes, hashes, names and kinds are checked; no file is left."""
     kind = "models" if command == "policies" else "datasets"
     repository = hub.repositories[f"{kind}/ada/x"] = Repository()
     repository.commit({**held, "shapechanger.json": listed})

@@ -71,7 +71,6 @@ SUITE = "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\
 def test_a_module_of_the_current_folder_is_found(
     module: str, content: str, arguments: list[str], words: str, folder: Path, cli: Cli
 ) -> None:
-    """A user's module is imported from the current folder, as the documentation says."""
     (folder / f"{module}.py").write_text(content)
     (folder / "mine.toml").write_text(SUITE)
     assert words in cli.refused(*arguments)

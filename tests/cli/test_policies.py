@@ -34,7 +34,6 @@ def _convert(folder: Path, env: str = "InvertedPendulum") -> tuple[object, ...]:
 
 
 def test_policies_are_shown_and_listed(cli: Cli) -> None:
-    """The card gives training env, steps and inputs."""
     output = cli.output("policies", "show", POLICIES["reach"])
     for part in ("shapechanger/Finger-v1", "307,200", "PIP_flexion"):
         assert part in output
@@ -122,7 +121,6 @@ def trained(tmp_path: Path, cli: Cli) -> Path:
 
 
 def test_a_folder_is_listed(trained: Path, cli: Cli) -> None:
-    """Invalid files are listed with the reason; an empty folder is an error."""
     (trained.parent / "other.safetensors").write_text("no")
     output = cli.output("policies", "list", trained.parent)
     for part in ("mine.safetensors", "shapechanger/InvertedPendulum-v1", "is not a policy"):
@@ -170,7 +168,6 @@ def build(envs, seed):
 def test_a_policy_of_a_users_learner_is_evaluated_if_the_learner_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
-    """The user's module is imported only if it is named."""
     (tmp_path / "own_a2c.py").write_text(OWN)
     monkeypatch.delitem(sys.modules, "own_a2c", raising=False)
     monkeypatch.chdir(tmp_path)
@@ -205,7 +202,6 @@ def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_policy_is_trained_in_drawn_bodies(policy: Path) -> None:
-    """The card names the bodies, and describes a limb policy."""
     card = load_policy(policy).card
     assert card.env.kwargs == {"bodies": {"split": "train", "count": 3, "seed": 0}}
     assert card.learner == "limbs"
@@ -251,7 +247,6 @@ def test_a_policy_does_not_fit_another_family(command: str, policy: Path, cli: C
 
 
 def test_other_policies_are_exported_for_their_own_body(tmp_path: Path, cli: Cli) -> None:
-    """--body is refused for a policy that fits only one body."""
     export = ("policies", "export", POLICIES["reach"], "--env", "Finger")
     answer = cli.refused(*export, "--out", tmp_path / "finger.onnx")
     assert "Only a limb policy can be exported for another body" in answer

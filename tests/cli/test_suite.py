@@ -86,7 +86,6 @@ def complete_suite(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, _Cou
 
 
 def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> None:
-    """The output has a report and a table row for each pair, and a summary sentence."""
     out, _, output = complete_suite
     lines = [line.strip() for line in output.splitlines()]
     header = next(i for i, line in enumerate(lines) if line.startswith("study"))
@@ -105,7 +104,6 @@ def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> 
 def test_a_stopped_suite_resumes_to_the_same_numbers(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After Ctrl-C, the same command executes only the remaining runs."""
     # Reports are slow to draw, and not part of this test.
     monkeypatch.setattr("shapechanger.cli.suite.write_study_report", lambda study, folder: folder)
     whole, all_of_it, _ = complete_suite
@@ -154,7 +152,6 @@ def test_after_a_failed_run_other_studies_go_on_except_on_a_robot(
 def test_folders_of_two_machines_are_merged(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Overlapping and incomplete folders merge to the same numbers."""
     monkeypatch.setattr("shapechanger.cli.suite.write_study_report", lambda study, folder: folder)
     whole = complete_suite[0]
     parts = {"a": _PAIRS[:2], "b": _PAIRS[1:3]}
@@ -181,7 +178,6 @@ def test_folders_of_two_machines_are_merged(
 def test_conflicting_folders_are_refused(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path
 ) -> None:
-    """Folders with different results are refused, and so is the output folder as an input."""
     name = _PAIRS[0]
     for part in ("a", "b"):
         shutil.copytree(complete_suite[0] / name, tmp_path / part / name)
@@ -201,7 +197,6 @@ def test_conflicting_folders_are_refused(
 def test_a_suite_can_be_watched(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The table has complete studies, and running studies with their last evaluation."""
     shutil.copytree(complete_suite[0], tmp_path / "all")
     at_work = tmp_path / "all" / _PAIRS[0] / "runs" / "fine-tune-1"
     (at_work / "run.json").unlink()

@@ -20,16 +20,8 @@ def _pairs(name: str) -> list[tuple[str, str, str]]:
 
 def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
     counts = {name: len(_pairs(name)) for name in shipped_suites()}
-    assert counts == {
-        "ants": 12,
-        "lenses": 4,
-        "methods": 1,
-        "pendulums": 6,
-        "replay": 1,
-        "shank": 9,
-        "vehicles": 12,
-        "waypoints": 12,
-    }
+    few = {"lenses": 4, "methods": 1, "pendulums": 6, "replay": 1, "shank": 9}
+    assert counts == few | {"ants": 12, "vehicles": 12, "waypoints": 12}
     for _, task in suite_tasks(load_suite("vehicles")):
         assert task.source.kwargs == task.target.kwargs == {"put_back": True}
     lenses = dict(suite_tasks(load_suite("lenses")))
@@ -53,10 +45,7 @@ def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
         ("envs = ['Ant']\nsources = ['Ant']\ntargets = ['BigAnt']\n", "in one way"),
         ("sources = ['Ant']\n", "in one way"),
         ("envs = ['Ant',\n'Bigant', 'Hopper']\n", "mine.toml, line 2: No env"),
-        (
-            "pairs = [['Ant', {env = 'Ant', body = 'BigAnt'}], ['Ant', 'Ant']]\n",
-            "called Ant-to-Ant",
-        ),
+        ("pairs = [['Ant', {env = 'Ant', body = 'BigAnt'}], ['Ant', 'Ant']]", "called Ant-to-Ant"),
         (
             "envs = ['Ant', 'BigAnt']\nlearner = 'ppo-run'\n[settings]\nlearning_rte = 1.0\n",
             "mine.toml, line 4: No setting of ppo-run matches 'learning_rte'. Did you mean",

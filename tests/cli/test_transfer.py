@@ -77,7 +77,6 @@ def _until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> Non
 def test_a_killed_study_resumes_to_the_same_numbers(
     quick: tuple[Path, subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:
-    """After Ctrl-C and a kill, the same command gives the same curves."""
     out = tmp_path / "study"
     for how, run_name in ((signal.SIGINT, "scratch-0"), (signal.SIGKILL, "fine-tune-0")):
         process = subprocess.Popen(
@@ -124,7 +123,6 @@ def test_training_writes_a_policy_and_logs(trained: tuple[Path, str]) -> None:
 def test_a_policy_is_played_in_its_body_and_in_another(
     trained: tuple[Path, str], tmp_path: Path, cli: Cli
 ) -> None:
-    """Without a policy, the actions are random."""
     film = tmp_path / "film.mp4"
     policy = ("--policy", trained[0])
     for words in (("InvertedPendulum", *policy), ("BigInvertedPendulum", *policy), ("Ant",)):

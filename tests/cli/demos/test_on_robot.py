@@ -102,7 +102,6 @@ def test_any_key_except_e_ends_the_replay(robot: RunningRobot, tmp_path: Path) -
 def test_an_episode_that_does_not_fit_the_robot_is_refused(
     robot: RunningRobot, tmp_path: Path
 ) -> None:
-    """Rate and layout are checked before asking to arm."""
     slow = forward(tmp_path / "slow", robot, 0.2, control_hz=7.0)
     with person(slow, tmp_path) as terminal:
         terminal.read_until("steps a second.")

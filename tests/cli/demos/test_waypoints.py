@@ -134,7 +134,6 @@ def test_waypoints_are_on_the_circle_that_was_driven(tmp_path: Path) -> None:
 
 
 def test_images_of_each_camera_are_warped_by_its_geometry(tmp_path: Path) -> None:
-    """The note names all cameras; a given camera replaces the cameras of the recording."""
     _record(tmp_path)
     _record(tmp_path, camera_pitch_deg=8.0, camera_fovy_deg=60.0)
     view = CanonicalView()
@@ -177,7 +176,6 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
 def test_unsuitable_recordings_are_refused(
     tmp_path: Path, changes: dict[str, Any], why: str
 ) -> None:
-    """One sentence names all missing data, and no file is written."""
     data, out = _record(tmp_path / "drive", **changes), tmp_path / "policy.safetensors"
     with pytest.raises((DemosError, WorldError), match=why):
         DemosTrain(data, out, waypoints=True).run()
@@ -198,7 +196,6 @@ def test_several_bodies_and_no_pictures_are_refused(tmp_path: Path) -> None:
 
 
 def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
-    """--camera and --response need --waypoints, which excludes --head and --inputs."""
     data, out = tmp_path / "drive", tmp_path / "policy.safetensors"
     with pytest.raises(DemosError, match="need --waypoints"):
         DemosTrain(data, out, camera=(0.0, 48.8)).run()
@@ -213,7 +210,6 @@ def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
 def test_a_recorded_car_teaches_a_policy_for_a_tank(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A policy learned from a car's steering plays in a tank."""
     data, out = tmp_path / "drive", tmp_path / "policy.safetensors"
     main(["demos", "record", "Car", "--out", str(data), "--minutes", "0.1"])
     main(["demos", "train", str(data), "--out", str(out), "--waypoints"])

@@ -22,7 +22,6 @@ from tests.finger.identify.logs import recorded
 
 
 def test_a_finger_is_recorded(tmp_path: Path, finger: Cli) -> None:
-    """The log equals the Python API's with the same seeds."""
     out = tmp_path / "new" / "log.npz"
     words = ("--seconds", 2.4, "--seed", 4, "--gap", "real-like", "--finger-seed", 3)
     printed = finger.output("record", "Finger", "--out", out, *words, "--actions", "tension")
@@ -43,7 +42,6 @@ def test_invalid_recordings_are_refused(tmp_path: Path, finger: Cli) -> None:
 
 
 def test_invalid_logs_are_refused(tmp_path: Path, finger: Cli) -> None:
-    """Missing and short logs, and outputs that would overwrite the log."""
     log = tmp_path / "log.npz"
     assert "cannot be read: No such file" in finger.refused("identify", log)
     finger.output("record", "Finger", "--out", log, "--seconds", "1")
@@ -56,7 +54,6 @@ def test_invalid_logs_are_refused(tmp_path: Path, finger: Cli) -> None:
 def test_geared_motors_can_be_assumed_if_the_log_does_not_describe_them(
     tmp_path: Path, finger: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`--geared` assumes the shipped rig's motors unless the log describes its motors."""
     log, _ = recorded(2.4)
     own = NOMINAL.replace(motor_kg=0.5)
     save_log(dataclasses.replace(log, motors=None), tmp_path / "log.npz")
@@ -75,7 +72,6 @@ def test_geared_motors_can_be_assumed_if_the_log_does_not_describe_them(
 
 @pytest.mark.slow
 def test_a_finger_is_identified(tmp_path: Path, finger: Cli) -> None:
-    """The output has all moment arms, the undetermined parameters, and a summary."""
     log, out = tmp_path / "log.npz", tmp_path / "finger.json"
     gap = ("--gap", "real-like", "--finger-seed", 3)
     finger.output("record", "Finger", "--out", log, "--seconds", 6, *gap)
@@ -91,7 +87,6 @@ def test_a_finger_is_identified(tmp_path: Path, finger: Cli) -> None:
 
 
 def test_a_finger_is_exported(tmp_path: Path, finger: Cli) -> None:
-    """The finger may be from a gap, a file or a named set of parameters, or nominal."""
     out, file = tmp_path / "finger.xml", tmp_path / "finger.json"
     drawn = GAPS["real-like"].draw(np.random.default_rng(3))
     file.write_text(drawn.to_json())

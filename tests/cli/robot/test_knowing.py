@@ -21,7 +21,6 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_new_robot_is_remembered() -> None:
-    """The message names the command to drive the robot; a repeat has no effect."""
     message = store(_MINE)
     assert recall("rover") == _MINE
     assert message == "Known here as rover: `shapechanger robot drive rover` drives it from here."

@@ -59,7 +59,6 @@ def test_drive_opens_the_console_with_its_key(
 
 
 def test_without_a_display_nothing_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a display, the terminal is used."""
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     assert can_open() == (sys.platform == "darwin")

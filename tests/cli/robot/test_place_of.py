@@ -36,7 +36,6 @@ def _shipped(name: str) -> Profile:
     ],
 )
 def test_the_default_place(name: str, place: Place) -> None:
-    """Vehicles get the world of their kind, fingers a rig, and other robots the room."""
     assert place_of(_shipped(name), "", ()) == place
 
 
@@ -49,7 +48,6 @@ def test_the_finger_of_a_gap_is_the_finger_of_the_env() -> None:
 
 
 def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path) -> None:
-    """If a world is requested, the error names the part that does not fit."""
     text = changed('part = "steering"', 'part = "rudder"')
     odd = write_profile(tmp_path, text)
     assert place_of(odd, "", ()) == Place()

@@ -28,7 +28,6 @@ def _jpeg(path: Path, picture: NDArray[np.uint8]) -> str:
 
 
 def test_a_board_is_measured_written_and_drawn(profile: Path, tmp_path: Path, cli: Cli) -> None:
-    """Without a board, the values of the profile are drawn."""
     picture = _jpeg(tmp_path / "board.jpg", board_picture(4.0, 48.8, 35.0))
     said = cli.output("robot", "camera", profile, "--picture", picture, "--board", "7x5")
     camera = load_profile(profile).camera
@@ -43,7 +42,6 @@ def test_a_board_is_measured_written_and_drawn(profile: Path, tmp_path: Path, cl
 
 
 def test_the_pitch_is_measured_from_a_horizon(profile: Path, tmp_path: Path, cli: Cli) -> None:
-    """No board is needed with --horizon and --fovy."""
     picture = _jpeg(tmp_path / "wall.jpg", np.full((120, 160, 3), 90, np.uint8))
     options = ("--picture", picture, "--horizon", "50", "--fovy", "48.8")
     cli.output("robot", "camera", profile, *options)
@@ -76,7 +74,6 @@ def test_the_pitch_is_measured_from_a_horizon(profile: Path, tmp_path: Path, cli
 def test_unsuitable_options_and_images_are_refused(
     profile: Path, tmp_path: Path, cli: Cli, robot: str, options: str, message: str
 ) -> None:
-    """One sentence, and the profile is unchanged."""
     before = profile.read_bytes()
     _jpeg(tmp_path / "wall.jpg", np.full((120, 160, 3), 90, np.uint8))
     (tmp_path / "text.jpg").write_bytes(b"no picture")

@@ -64,7 +64,6 @@ def record(folder: Path, count: int = 40) -> Path:
 def test_fetching_copies_exactly_and_later_only_new_data(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Later edits on the robot are fetched too."""
     first, data = record(there), tmp_path / "here"
     fetch = ["robot", "fetch", "car", "--out", str(data)]
     main(fetch)
@@ -157,7 +156,6 @@ def test_a_repaired_copy_is_kept(there: Path, robot: RobotClient, tmp_path: Path
 def test_an_episode_with_other_steps_is_not_overwritten(
     there: Path, robot: RobotClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The conflict is reported, other episodes are fetched, and the exit code is 1."""
     first, data = record(there, 4), tmp_path / "here"
     fetch_episode(robot, first.name, data)
     steps = first / "steps.jsonl"

@@ -42,7 +42,6 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[str], l
 
 
 def test_enter_selects_the_defaults(asked: tuple[list[str], list[str]]) -> None:
-    """The profile is then the same as the shipped profile."""
     questions, answers = asked
     answers += [""] * 4
     RobotInit().run()
@@ -53,7 +52,6 @@ def test_enter_selects_the_defaults(asked: tuple[list[str], list[str]]) -> None:
 def test_answers_are_checked(
     asked: tuple[list[str], list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """An invalid choice is asked for again; an existing profile is refused at the end."""
     _, answers = asked
     answers += ["kar", "tank", "rover", "noen", "none", "anyone"]
     RobotInit().run()
@@ -76,7 +74,6 @@ def test_answers_are_checked(
 def test_the_end_of_the_answers_writes_nothing(
     asked: tuple[list[str], list[str]], tmp_path: Path
 ) -> None:
-    """Ctrl-D ends the command with one sentence."""
     _, answers = asked
     answers += ["car", "rover"]
     with pytest.raises(RobotError, match="nothing was written"):
@@ -87,7 +84,6 @@ def test_the_end_of_the_answers_writes_nothing(
 def test_with_arguments_no_question_is_asked(
     asked: tuple[list[str], list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Arguments can set all answers. Without a terminal, the kind must be given."""
     with pytest.raises(RobotError, match=r"`shapechanger robot init car`. There are: .*boat"):
         RobotInit(name="rover").run()
     RobotInit("car", "bench", camera="none").run()
@@ -124,7 +120,6 @@ def said(pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]) -> Said:
 
 
 def test_install_reports_each_change(pi: FakePi, car: Profile, said: Said) -> None:
-    """Each change is printed; a second run changes nothing and asks for no restart."""
     lines = said()
     unit = pi.root / "etc/systemd/system/shapechanger-rover.service"
     assert "did      group gpio: pi is in the group gpio." in lines

@@ -131,7 +131,6 @@ MISTAKES = (
 def test_one_sentence(
     robot: Cli, home: Path, monkeypatch: pytest.MonkeyPatch, command: str, text: str
 ) -> None:
-    """The exit code is 2, and no file or process is left."""
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
     write_ready_profile(home)
     (home / "work" / "twice.toml").write_text(changed("pins = [13, 12]", "pins = [22, 12]"))
@@ -143,7 +142,6 @@ def test_one_sentence(
 
 
 def test_remember_requires_the_key(robot: Cli) -> None:
-    """The key must not be given on the command line."""
     command = ("remember", "one", "127.0.0.1", "--fingerprint", "insecure")
     assert "SHAPECHANGER_KEY" in robot.refused(*command)
 
@@ -181,7 +179,6 @@ def test_init_never_overwrites(robot: Cli, home: Path) -> None:
 
 
 def test_the_key_can_be_shown_again(robot: Cli, home: Path) -> None:
-    """The output has the key and fingerprint that `init` has printed."""
     made = robot.output("init", "car", "--name", "rover")
     output = robot.output("key", "rover")
     assert all(part in made for part in output.strip().split("\n\n"))
@@ -203,7 +200,6 @@ def test_a_profile_in_the_current_folder_is_found_by_its_name(robot: Cli, home: 
 
 
 def test_stopping_a_robot_that_is_off(robot: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The exit code is 1, and the error says that the stop was not confirmed."""
     with socket.create_server(("127.0.0.1", 0)) as unused:
         address = f"127.0.0.1:{unused.getsockname()[1]}"
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
@@ -223,7 +219,6 @@ def test_a_machine_without_pins(robot: Cli, home: Path, command: str) -> None:
 def test_a_full_disk_leaves_no_partial_robot(
     robot: Cli, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No partial file is left, and `init` can be run again."""
     real, left = os.fsync, 0
 
     def fsync(fd: int) -> None:
@@ -261,7 +256,6 @@ def test_a_broken_file_of_a_known_robot_is_skipped(
 
 
 def test_questions_are_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A question is repeated until the answer is yes or no, or the input ends."""
     answers = iter(["", "maybe", "Y", "n"])
 
     def answer() -> str:

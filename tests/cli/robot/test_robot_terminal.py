@@ -223,7 +223,6 @@ def _calibrate(folder: Path, text: str, *steps: tuple[str, str], code: int = 0) 
 
 
 def test_calibrating_a_motor_and_a_servo(tmp_path: Path) -> None:
-    """Results are written, a reversed motor gets a negative mix, and other lines are kept."""
     steps = (
         ("begins to move", "d" * 4 + "\r"),
         ("Y or N", "n"),
@@ -267,7 +266,6 @@ def test_a_key_that_ends_the_calibration_discards_results(tmp_path: Path, key: s
 
 
 def test_an_error_keeps_earlier_results(tmp_path: Path) -> None:
-    """The motor's results are written, and the robot does not count as calibrated."""
     steps = [("begins to move", "dddd"), ("duty 0.16", "\r"), ("Y or N", "y")]
     for place in ("full left", "straight", "full right"):
         steps += [(place, ""), ("1500 µs", "\r")]
@@ -302,7 +300,6 @@ def test_a_second_person_stops_a_robot(
 def test_a_served_twin_becomes_a_known_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With --port 0, the port that was selected is stored."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     profile = write_profile(tmp_path, BLIND_CAR)
     serve = ("robot", "serve", str(profile.path), "--twin", "--no-announce", "--port", "0")
@@ -355,7 +352,6 @@ def test_a_person_lets_a_policy_drive_and_corrects_it(
 def test_recordings_are_kept_after_a_failure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """After an error, the output names the command that downloads the recording."""
     with (
         run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
         robot.client(role="person") as person,

@@ -63,7 +63,6 @@ def _lit(kind: str, pins: HeldPins, ask: Callable[[str], bool | None]) -> dict[s
 
 
 def test_each_led_is_lit_alone(pins: HeldPins) -> None:
-    """The person is asked while the LED is lit; all LEDs are off at the end."""
     numbers = [22, 27, 4, 17, 19]
     seen: list[list[int]] = []
 

@@ -23,7 +23,6 @@ def _parts(*findings: Finding | BaseException) -> Iterator[tuple[str, Iterator[F
 
 
 def test_a_report_is_anonymous(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A report names neither the computer nor its user, only the model of the board."""
     monkeypatch.setattr(socket, "gethostname", lambda: "annas-pi")
     monkeypatch.setattr(getpass, "getuser", lambda: "anna")
     monkeypatch.setattr(Path, "home", lambda: Path("/home/anna"))

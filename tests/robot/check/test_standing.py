@@ -81,7 +81,6 @@ def test_the_boot_configuration_is_read(tmp_path: Path, line: str, gpiod: str, s
 
 
 def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path, car: Profile) -> None:
-    """Checks of settings are unknown, because this computer has no config.txt."""
     found = _on(tmp_path, replace(car, sensors=()))
     assert (found["computer"].level, found["strict_gpiod"].level) == ("unknown", "unknown")
     assert "does not exist: a Raspberry Pi has it" in found["devices"].sentence
@@ -241,7 +240,6 @@ def test_pressed_switches_and_a_low_battery_are_reported(car: Profile) -> None:
 
 
 def test_the_servos_of_a_rig_answer() -> None:
-    """Servos are read without torque, and a missing one is named."""
     rig = shipped("finger")
     board = _board(rig)
     assert _wired(rig, board.hardware)["servo bus"] == [("good", "All 7 servos answer.")]

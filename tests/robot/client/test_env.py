@@ -90,7 +90,6 @@ def test_an_env_passes_the_checks(
 
 
 def test_layouts_name_images_and_states(run: Run, made: Made) -> None:
-    """Images have the requested size; `render` has the camera's size."""
     env = made(run(), state=True, size=(40, 30), render_mode="rgb_array")
     observation, action = layouts_of(env)
     assert observation.names == ("camera/image", *(f.name for f in STATE))

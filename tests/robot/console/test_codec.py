@@ -52,7 +52,6 @@ def _again(console: Console, *packed: bytes) -> list[str]:
 
 
 def test_every_value_survives_a_round_trip(car: RunningRobot, visit: Visit) -> None:
-    """Integers, strings, bytes, arrays and maps of every width round-trip exactly."""
     packed = [msgspec.msgpack.encode(value) for value in _VALUES]
     for value, text in zip(_VALUES, _again(visit(car, key=""), *packed), strict=True):
         assert msgspec.msgpack.decode(base64.b64decode(text)) == value

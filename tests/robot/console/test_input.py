@@ -290,7 +290,6 @@ def test_a_gamepad_drives_only_after_a_rest_since_its_last_change(person: Input)
 
 
 def test_a_gamepad_of_unknown_mapping_is_ignored(person: Input) -> None:
-    """The page reports it, and the pad's buttons have no effect either."""
     for change in ("{ axes: [0, 0, 0, 0, 0, 0] }", "{ axes: [0, 0, -1, -1, 0, -1] }"):
         person.page.evaluate(f"pad(0, {change}, '')")
         assert person.held() == (0, 0)

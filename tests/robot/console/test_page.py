@@ -58,7 +58,6 @@ def test_a_wrong_key_is_an_error_and_keeps_the_form(car: RunningRobot, visit: Vi
 
 
 def test_every_control_has_an_accessible_name(car: RunningRobot, visit: Visit) -> None:
-    """The accessibility tree has landmarks, and STOP is first in the focus order."""
     console = visit(car)
     console.await_state(picture="live")
     session = console.page.context.new_cdp_session(console.page)
@@ -79,7 +78,6 @@ def test_every_control_has_an_accessible_name(car: RunningRobot, visit: Visit) -
 def test_controls_are_large_and_do_not_overlap(
     car: RunningRobot, visit: Visit, size: dict[str, Any]
 ) -> None:
-    """On desktop and phone, targets are large enough and fit the screen width."""
     console = visit(car, **size)
     console.await_state(picture="live")
     page = console.page

@@ -28,7 +28,6 @@ _SHIPPED = Path(load.__file__).parent / "shipped"
 
 
 def test_a_second_person_cannot_take_control(car: RunningRobot, visit: Visit) -> None:
-    """The second person sees who has control, and can stop the robot."""
     first, second, pins = visit(car), visit(car), Pins(car)
     first.arm()
     second.await_state(link="open", driver="person")

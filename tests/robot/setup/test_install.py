@@ -86,7 +86,6 @@ def test_a_failed_change_is_reported_with_its_command(
 
 
 def test_the_service_is_removed(pi: FakePi) -> None:
-    """An older unit is replaced; removing it leaves no file. A dry run reports commands."""
     pi.write(_UNIT, "old")
     found = _install(pi, shipped("car"), dry=True)
     assert found["group gpio"] == ("would", "sudo usermod -aG gpio pi")

@@ -47,7 +47,6 @@ def _board(tremble: float = 0.0) -> LocalBoard:
 
 @pytest.mark.parametrize("tremble", [0.0, 0.02])
 def test_zeros_are_the_counts_of_straight_joints(tremble: float) -> None:
-    """Zeros are keyed by joint, and averaged correctly around count 0."""
     zeros = find_joint_zeros(_RIG, _board(tremble).hardware, lambda: None)
     names = ["MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion"]
     assert zeros == {f"joints.{n}": zero for n, zero in zip(names, _ZEROS, strict=True)}
