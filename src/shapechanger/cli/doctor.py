@@ -75,7 +75,9 @@ def examine_machine(
         *(("machine", _machine()), ("core", _extra(parsed, "", installed))),
         *((f"extra {extra}", _extra(parsed, extra, installed)) for extra in extras),
         # The check of its extra reports a package that is not installed.
-        *((name, check()) for name, package, check in _PACKAGES if installed(package)),
+        *([("images", _drawing())] if installed("mujoco") else []),
+        *([("torch", _torch())] if installed("torch") else []),
+        *([("warp", _warp())] if installed("warp-lang") else []),
         ("pins", _gpio(dev)),
     ]
     return run_checks(checks, _PATIENCE_S)
@@ -114,7 +116,6 @@ def _extra(parsed: Sequence[Requirement], extra: str, installed: Callable[[str],
 
 
 def _drawing() -> Results:
-    """Check whether MuJoCo can render an image, and report the OpenGL library."""
     command = [sys.executable, "-c", _DRAW]
     done = subprocess.run(
         command, capture_output=True, text=True, check=False, timeout=_PATIENCE_S - 1
@@ -144,7 +145,6 @@ def _warp() -> Results:
 
 
 def _gpio(dev: Path) -> Results:
-    """Check whether this machine has GPIO pins that a robot could use."""
     chips = sorted(dev.glob("gpiochip*"))
     if not chips:
         yield "unknown", "No GPIO on this machine: robots run as twins, on simulated pins."
@@ -153,9 +153,3 @@ def _gpio(dev: Path) -> Results:
     else:
         remedy = "run `sudo usermod -aG gpio $USER` and log in again"
         yield "bad", f"No permission to open {chips[0]}: {remedy}."
-
-
-# Checks of packages: name, package, function.
-_PACKAGES: Final = (
-    *(("images", "mujoco", _drawing), ("torch", "torch", _torch), ("warp", "warp-lang", _warp)),
-)

@@ -120,7 +120,6 @@ def _layout_table(side: str, layout: Layout) -> Table:
 
 
 def _in_words(value: Any) -> str:
-    """Format a value; numbers are rounded."""
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, tuple):

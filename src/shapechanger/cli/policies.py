@@ -157,8 +157,6 @@ def _fitting(env: gym.Env[Any, Any], card: PolicyCard) -> gym.Env[Any, Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class _OfPolicy:
-    """Options of a command for one policy."""
-
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A policy, such as results/policies/Ant-v1.safetensors, a clone, or one exported as ONNX."""
     learner: OwnLearner = ""
@@ -166,8 +164,6 @@ class _OfPolicy:
 
 @dataclass(frozen=True, kw_only=True)
 class _InEnv(_OfPolicy):
-    """Options of a command for a policy in an env."""
-
     env: str = ""
     """Id of another env, in which the policy acts through the body map that matches names; if not
     given, the env that the policy was trained in."""

@@ -227,8 +227,6 @@ def _progress_table(out: Path) -> tuple[Table, bool]:
 
 
 class _Page:
-    """The HTML page of a suite, written again whenever a study has ended."""
-
     def __init__(self, name: str, out: Path | None) -> None:
         self.suite = load_suite(name)
         allow_own_modules(self.suite.learner, *self.suite.arms)

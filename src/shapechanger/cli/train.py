@@ -74,7 +74,6 @@ class Train:
         say(f"wrote {out}")
 
     def _by_learner(self, env: EnvRef) -> tuple[int, _Training]:
-        """Check the learner and its budget; return the number of steps and the training."""
         wanted = self.learner or ("limbs" if self.bodies else default_learner(env))
         if self.bodies:
             wanted = in_many_bodies(wanted)
@@ -113,7 +112,6 @@ class Train:
         return whole, training
 
     def _by_teacher(self, env: EnvRef, teacher: Path) -> tuple[int, _Training]:
-        """Return the number of steps, and the training of a student of `teacher`."""
         from shapechanger.vehicles.cloning import STUDENT_STEPS, train_student  # PyTorch.
 
         if self.learner or self.set or self.tensorboard is not None:

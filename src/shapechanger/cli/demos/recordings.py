@@ -144,8 +144,6 @@ def _totals(count: int, episodes: Sequence[Episode]) -> str:
 
 @dataclass(frozen=True)
 class _Steps:
-    """A range of steps of an episode."""
-
     episode: _Episode
     first: _From = None
     """The first step of the range; the episode's first step if not given."""
@@ -170,12 +168,8 @@ class DemosCut(_Steps):
 
     def run(self) -> None:
         episode, first, last = self._range()
-        least, most = episode.steps[0].index, episode.steps[-1].index
-        if first > least:
-            edit(episode.path, Drop(least, first - 1, "cut"))
-        if last < most:
-            edit(episode.path, Drop(last + 1, most, "cut"))
-        _tell(episode.path)
+        ends = (episode.steps[0].index, first - 1), (last + 1, episode.steps[-1].index)
+        _edit(episode.path, *(Drop(*span, "cut") for span in ends if span[0] <= span[1]))
 
 
 class DemosBad(_Steps):
@@ -183,8 +177,7 @@ class DemosBad(_Steps):
 
     def run(self) -> None:
         episode, first, last = self._range()
-        edit(episode.path, Drop(first, last, "bad"))
-        _tell(episode.path)
+        _edit(episode.path, Drop(first, last, "bad"))
 
 
 class DemosGood(_Steps):
@@ -192,8 +185,7 @@ class DemosGood(_Steps):
 
     def run(self) -> None:
         episode, first, last = self._range()
-        edit(episode.path, Keep(first, last))
-        _tell(episode.path)
+        _edit(episode.path, Keep(first, last))
 
 
 @dataclass(frozen=True)
@@ -212,7 +204,9 @@ class DemosMark:
         say(f"marked step {self.step} of {episode.path}")
 
 
-def _tell(path: Path) -> None:
+def _edit(path: Path, *edits: Drop | Keep) -> None:
+    for one in edits:
+        edit(path, one)
     episode = read_episode(path)
     count, seconds = len(episode.kept), episode.seconds
     say(f"{count} of {len(episode.steps)} steps of {path} count, {seconds:.1f} s")

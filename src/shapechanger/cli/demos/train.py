@@ -159,7 +159,6 @@ class DemosTrain(_Waypoints):
         _print_evaluation(evaluation)
 
     def _require_files(self) -> None:
-        """Check before the work that the files can be written."""
         check_seed(self.seed, StudyError)
         written = [self.out, self.out.with_suffix(".html"), self.out.with_suffix(".json")]
         written += [path for path in (self.sac, self.ppo) if path is not None]

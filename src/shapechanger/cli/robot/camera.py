@@ -101,7 +101,6 @@ class RobotCamera:
     def _measured(
         self, picture: NDArray[np.uint8], corners: tuple[int, int] | None, stated: CameraPlan
     ) -> CameraGeometry:
-        """Measure the geometry, and print how certain it is."""
         if corners is not None:
             found = measure_camera(picture, corners, self.fovy)
             say(

@@ -149,7 +149,6 @@ class RobotCheck:
         return level
 
     def _require_consent(self, profile: Profile, *, asks: bool) -> None:
-        """Refuse to drive pins until a person has confirmed that the robot cannot run away."""
         if not self.leds and not self.wheels_up:
             ask_for_wheels_up()
         if self.jumper is not None:

@@ -182,7 +182,6 @@ class Driving:
                 live.update(self._line(seen, self._unanswered(values, seen)))
 
     def _take_keys(self, wait_s: float, seen: Observation) -> bool:
-        """Handle key presses and return whether to continue."""
         until_s = time.monotonic() + wait_s
         while (left_s := until_s - time.monotonic()) > 0.0:
             for key in self._terminal.keys(left_s):
@@ -265,7 +264,6 @@ class Driving:
         return ""
 
     def _line(self, seen: Observation, remark: str) -> Text:
-        """Format the robot's state and a remark as one line."""
         if seen.emergency:
             state = "EMERGENCY STOP"
         elif not seen.mine:

@@ -134,7 +134,7 @@ class RobotInit:
             f"wrote {profile}: check its pins before anything moves\n"
             f"{'wrote' if is_new else 'kept'} {unit}: its systemd unit\n"
             f"key and certificate in {credentials.folder}\n\n"
-            f"{shown_credentials(credentials)}\n"
+            f"{shown_credentials(name, credentials)}\n"
         )
         if not installs:
             say(
@@ -143,7 +143,6 @@ class RobotInit:
                 f"      shapechanger robot check {profile} --wiring\n"
                 f"      shapechanger robot serve {profile}   (with --twin: without any hardware)"
             )
-        say(how_to_remember(name, credentials))
         return profile
 
 
@@ -169,7 +168,7 @@ class RobotKey:
                 "robot of this machine", self.name, sorted(path.name for path in there)
             )
         credentials = load_credentials(folder)
-        say(f"{shown_credentials(credentials)}\n\n{how_to_remember(self.name, credentials)}")
+        say(shown_credentials(self.name, credentials))
         if not self.qr:
             return
         try:
@@ -190,16 +189,10 @@ def shown_credentials(credentials: Credentials) -> str:
     return (
         f"key          {credentials.key}\n"
         f"fingerprint  {fingerprint.hex()}\n"
-        f"in short     {fingerprint_short(fingerprint)}"
-    )
-
-
-def how_to_remember(name: str, credentials: Credentials) -> str:
-    """Return the command to run on the computer that will drive the robot."""
-    return (
+        f"in short     {fingerprint_short(fingerprint)}\n\n"
         "On the workstation, with the key from above:\n"
         f"      shapechanger robot remember {name} {socket.gethostname()}.local "
-        f"--fingerprint {credentials.fingerprint.hex()}"
+        f"--fingerprint {fingerprint.hex()}"
     )
 
 
@@ -270,8 +263,7 @@ class RobotInstall:
     """Folder of the robot's key and certificate; by default the one that `init` made."""
 
     def run(self) -> None:
-        path = own_profile(self.profile)
-        self.install(load_profile(path), Machine(getpass.getuser()))
+        self.install(load_profile(own_profile(self.profile)), Machine(getpass.getuser()))
 
     def install(self, profile: Profile, machine: Machine) -> None:
         """Make the changes on a machine."""
@@ -307,7 +299,6 @@ class RobotInstall:
             )
 
     def _unit(self, profile: Profile, user: str) -> Path:
-        """Return the unit next to the profile, written now if it does not exist."""
         path = profile.path.absolute()
         unit = path.parent / unit_name(profile.name)
         if not unit.exists() and self.dry_run:

@@ -311,7 +311,6 @@ class Terminal:
                 return _as_typed(keys)
 
     def _read(self, wait_s: float) -> bytes:
-        """Return all available input, waiting for some up to a time limit."""
         data = b""
         while select.select([self._fd], [], [], 0.0 if data else max(0.0, wait_s))[0]:
             more = os.read(self._fd, 4096)

@@ -360,7 +360,6 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
 
 
 def _serial_port(device: str, machine: Machine) -> SystemChange:
-    """Return the change for servos at the header's own serial port."""
     lines = machine.config and machine.config.with_name("cmdline.txt")
 
     def is_made() -> bool:
