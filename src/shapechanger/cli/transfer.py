@@ -48,8 +48,8 @@ class StudyRuns:
     """Target steps of a run; the suite's or the learner's number if not given."""
     source_steps: int | None = None
     """Source steps of a source policy; the suite's or the learner's number if not given. The
-    learner's number is half of the target steps, and more for a rig. With --source-policy, they
-    apply to arms that train another source policy, such as identified."""
+    learner's number is half of the target steps, and more for a finger rig. With --source-policy,
+    they apply to arms that train another source policy, such as identified."""
     seed: int | None = None
     """Number that the seeds of all runs are drawn from; the suite's number, or 0, if not given."""
     executor: Literal["processes", "ray"] = "processes"

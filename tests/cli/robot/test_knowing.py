@@ -30,7 +30,7 @@ def test_a_new_robot_is_remembered() -> None:
 def test_the_address_of_a_known_robot_is_updated() -> None:
     remember(_MINE)
     moved = replace(_MINE, address="127.0.0.1:5001")
-    assert "now at 127.0.0.1:5001 and no more at 127.0.0.1:5000" in store(moved)
+    assert "now at 127.0.0.1:5001 instead of 127.0.0.1:5000" in store(moved)
     assert recall("rover") == moved
 
 

@@ -123,7 +123,7 @@ def test_install_reports_each_change(pi: FakePi, car: Profile, said: Said) -> No
     lines = said()
     unit = pi.root / "etc/systemd/system/shapechanger-rover.service"
     assert "did      group gpio: pi is in the group gpio." in lines
-    assert any(f"did      service: {unit} is the unit next to" in line for line in lines)
+    assert any(f"did      service: {unit} is a copy of the unit" in line for line in lines)
     assert any(line.startswith("Restart the computer") for line in lines)
     assert any("sudo systemctl start shapechanger-rover" in line for line in lines)
     assert f'robot serve "{car.path}"\n' in unit.read_text()

@@ -181,8 +181,8 @@ class DemosTrain(_Waypoints):
 
 
 def _print_evaluation(evaluation: EvaluationResult) -> None:
-    always = f"always the same: {evaluation.majority_baseline:.3f}"
-    say(f"{evaluation.steps} steps; {always}")
+    constant = f"{evaluation.majority_baseline:.3f}"
+    say(f"{evaluation.steps} steps; the best constant action has an accuracy of {constant}")
     if evaluation.head == "class":
         for name, row in zip(evaluation.classes, evaluation.confusion, strict=True):
             if sum(row):
@@ -192,7 +192,7 @@ def _print_evaluation(evaluation: EvaluationResult) -> None:
     else:
         for name, error in zip(evaluation.numbers, evaluation.errors, strict=False):
             say(f"  {name}: mean absolute error {error:.3f}")
-        say(f"within {evaluation.tolerance:g} of half the range {evaluation.within:.3f}")
+        say(f"share within {evaluation.tolerance:g} of half the range: {evaluation.within:.3f}")
         say(
             "accuracy counts steps whose numbers all fall in the driver's third of their range, "
             "such as left, straight or right"

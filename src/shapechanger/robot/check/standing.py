@@ -119,7 +119,7 @@ def _computer(robot: StandingRobot) -> Checks:
     yield "computer", [model if machine.model else ("unknown", other)]
     for change in settings_of_computer(profile, machine):
         level = "good" if change.is_made() else "bad" if machine.config else "unknown"
-        remedy = f"Not so: {change.state} `shapechanger robot install {profile.path}` changes this."
+        remedy = f"Not yet: {change.state} `shapechanger robot install {profile.path}` does this."
         otherwise = remedy if change.commands else change.instead
         yield change.name, [(level, change.state if level == "good" else otherwise)]
     yield "enable line", [_enable_line(profile)]

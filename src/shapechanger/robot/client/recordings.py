@@ -178,7 +178,7 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
         _require_fit(episode, robot.welcome)
         terminal.keys(0.0)  # Discard keys that were pressed before the prompt was shown.
         say(
-            f"{episode.seconds:.1f} s of {episode.path.name}, replayed without looking: "
+            f"{episode.seconds:.1f} s of {episode.path.name}, replayed without sensors: "
             f"{robot.welcome.robot} starts from its present place.\n"
             "E arms it and starts · any other key cancels; during the replay, any key stops it."
         )

@@ -268,7 +268,7 @@ def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterat
     path, wanted = machine.root / _UNITS / unit.name, machine.root / _WANTED / unit.name
     yield SystemChange(
         "service",
-        f"{path} is the unit next to the profile, and starts with the computer, not armed.",
+        f"{path} is a copy of the unit next to the profile, and starts the robot without arming.",
         lambda: os.path.lexists(wanted) and _text(path) == _text(unit),
         (
             _root("install -m 644", unit, path),
