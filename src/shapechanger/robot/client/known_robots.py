@@ -25,6 +25,7 @@ from typing import Final
 
 from shapechanger.errors import LinkError, UnknownName, translate_errors
 from shapechanger.files import cannot_write, read_text, write_atomic
+from shapechanger.robot.daemon.credentials import user_folder
 from shapechanger.robot.link import authentication
 from shapechanger.robot.link.address import Address, parse_address
 
@@ -79,8 +80,7 @@ def check_name(name: str) -> None:
 
 def known_folder() -> Path:
     """Return the folder of the known robots' files."""
-    config = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
-    return Path(config) / "shapechanger" / "known"
+    return user_folder("XDG_CONFIG_HOME", ".config") / "known"
 
 
 def known_names() -> tuple[str, ...]:
