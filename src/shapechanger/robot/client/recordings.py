@@ -41,8 +41,6 @@ from shapechanger.robot.client.teleop import Terminal
 from shapechanger.robot.link.messages import EpisodeSummary, Piece, Welcome
 
 _STEP: Final = b'{"kind":"step",'
-_CLOSED_WITHIN_S: Final = 10.0  # Time that a memory card may need for the last steps.
-_LOOK_EVERY_S: Final = 0.1
 
 
 def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[EpisodeSummary]:
@@ -153,19 +151,6 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
         if jpeg is not None and known != jpeg:
             file.write_bytes(jpeg)
     return lines
-
-
-def end_recording(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
-    """End a recording, if it has not ended by itself, and return its episodes."""
-    state = robot.recorder
-    if state is not None and state.recording:
-        robot.record(on=False)
-    until_s = time.monotonic() + _CLOSED_WITHIN_S
-    while True:
-        new = [episode for episode in episodes_there(robot) if episode.id not in before]
-        if all(episode.closed for episode in new) or time.monotonic() > until_s:
-            return new
-        time.sleep(_LOOK_EVERY_S)
 
 
 def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> None:

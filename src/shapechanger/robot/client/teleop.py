@@ -262,9 +262,7 @@ def _as_typed(keys: list[str]) -> list[str]:
     return keys if len({*keys} - {"enter", OTHER}) <= _AT_ONCE else [OTHER]
 
 
-_AT_ONCE: Final = 2
-_MARK_PASTES: Final = "\x1b[?2004h"
-_LEAVE_PASTES: Final = "\x1b[?2004l"
+_AT_ONCE: Final = 2  # Different keys that a person presses at once.
 
 
 class Terminal:
@@ -287,12 +285,12 @@ class Terminal:
         mode = termios.tcgetattr(self._fd)
         mode[0] &= ~termios.IXON  # Ctrl-S would block the output, and so the reading of keys.
         termios.tcsetattr(self._fd, termios.TCSAFLUSH, mode)
-        self._write(_MARK_PASTES)
+        self._write("\x1b[?2004h")  # Mark pasted text.
         return self
 
     def __exit__(self, *_: object) -> None:
         """Restore the terminal."""
-        self._write(_LEAVE_PASTES)
+        self._write("\x1b[?2004l")
         termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
 
     def keys(self, wait_s: float) -> list[str]:
