@@ -42,7 +42,7 @@ from shapechanger.identity import identify_env, texts_in
 from shapechanger.policy import MAX_BYTES, STEERING, CloneNetwork, PolicyCard, load_policy
 from shapechanger.reports.films import require_film, write_film
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
-from shapechanger.transfer.identities import ENV, known, require_same_env, single_body
+from shapechanger.transfer.identities import ENV, known, require_same_env
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act, evaluate, random_actions
 from shapechanger.transfer.references import load_references
 from shapechanger.vehicles.expert import PERIOD_S
