@@ -40,14 +40,9 @@ def write_report(
     training: Training | None,
     data_note: str,
 ) -> Path:
-    """Write the report of a policy with this name, and its numbers as JSON next to it.
+    """Write the report of a policy that was evaluated on `data`, and its numbers as JSON.
 
-    The policy was evaluated on the steps of the data; `evaluation.worst` has indices of the data,
-    and the note describes the data. The path of the JSON file is returned.
-
-    Raises:
-        MissingExtra: If matplotlib or Jinja2 is not installed.
-        OutputError: If a file cannot be written.
+    The path of the JSON file, which is next to the page, is returned.
     """
     by_class = evaluation.head == "class"
     numbers = {

@@ -26,23 +26,20 @@ from shapechanger.policy import load_policy
 EXPERT: Final = "expert"
 """Name of the expert of an env as a driver."""
 
-Act = Callable[[Any], NDArray[np.float32]]
-"""A policy: maps an observation to an action, shape (n,)."""
+Act = Callable[[Any], NDArray[np.float32]]  # A policy, from an observation to an action, (n,).
 
 # The expert takes over if a value of the two actions, such as the steering, has differed by more
 # than _APART for _APART_S without interruption; at once if an obstacle ahead would be reached
 # within _NEAR_S at the present speed, and the policy does not brake; and if the vehicle has stood
-# still for _STILL_S, because such steps would be useless. It hands back if no value has differed by
-# more than _AGREE for _AGREE_S without interruption, with no obstacle near.
+# still for _STILL_S, because such steps would be useless. The policy drives on if no value has
+# differed by more than _AGREE for _AGREE_S without interruption, with no obstacle near.
 _APART, _APART_S = 0.6, 0.3
 _NEAR_S: Final = 0.4
 _STILL_S: Final = 2.0
 _AGREE, _AGREE_S = 0.3, 1.0
 _ROUNDING: Final = 1e-9
-# Values of the actions of vehicles at which they are slowest.
-_RESTS: Final = {"throttle": 0.0, "waypoint/speed": -1.0}
+_RESTS: Final = {"throttle": 0.0, "waypoint/speed": -1.0}  # Values at which a vehicle is slowest.
 _CRAWLS_MPS: Final = 0.05  # Below this speed a vehicle does not collide.
-
 
 DriverDecision = tuple[NDArray[np.float32], Step, str]
 """Action to pass to the env, shape (n,); step with the action to record as decided, its driver, and
@@ -56,18 +53,9 @@ class Pilot:
     then, so that a learner sees recoveries; the env executes the erroneous action. While it
     corrects a policy, the expert makes no mistakes.
 
-    A policy is corrected if it is dangerous, not if it is slow: for a value such as the throttle,
-    any value from rest to the expert's value counts as agreement.
-
-    Args:
-        env: The env; dangers are detected in its `world`, if it has one.
-        act: The policy; None to let the expert drive.
-        expert: The expert; None to let the policy drive uncorrected.
-
-    Attributes:
-        steps: Number of decisions of a corrected policy and its expert.
-        corrected: Number of decisions of the expert.
-        takeovers: How often the expert took over.
+    A slow policy is not corrected: any throttle from rest to the expert's counts as agreement.
+    Dangers are detected in the `world` of the env, if it has one. A corrected policy and its expert
+    made `steps` decisions, the expert `corrected` of them in `takeovers` stretches.
     """
 
     def __init__(
@@ -84,7 +72,7 @@ class Pilot:
         self.steps = self.corrected = self.takeovers = 0
 
     def begin(self) -> None:
-        """Start an episode; with a policy, it drives."""
+        """Start an episode, in which a policy drives first."""
         self._corrects, self._lasted = False, 0
         if self._expert is not None:
             self._expert.begin()
@@ -148,16 +136,9 @@ class Pilot:
 
 
 def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) -> Pilot:
-    """Return the requested driver.
+    """Return the driver of an env: `EXPERT`, or the file of a policy, which `EXPERT` may correct.
 
-    Args:
-        env: The env to drive in.
-        driver: `EXPERT`, or the file of a policy.
-        corrected_by: `EXPERT` to let it take over if the policy goes wrong; "" for no corrections.
-        seed: Seed of the expert's mistakes.
-
-    Raises:
-        DemosError: If the env has no expert, or the policy does not fit it.
+    The seed is of the expert's mistakes.
     """
     inner: Any = env.unwrapped
     if corrected_by not in ("", EXPERT) or (corrected_by and driver == EXPERT):
@@ -212,17 +193,9 @@ def record_steps(
     seed: int,
     on_step: Callable[[int], object] = lambda steps: None,
 ) -> None:
-    """Record a number of steps; the last episode is closed in any case.
+    """Record a number of steps in episodes with consecutive seeds; the last one is always closed.
 
-    Args:
-        env: The recording env.
-        pilot: Who drives.
-        steps: Number of steps over all episodes.
-        seed: Seed of the first episode; later episodes use consecutive seeds.
-        on_step: Called after each step with the number of steps so far.
-
-    Raises:
-        OutputError: If a step cannot be written.
+    `on_step` is called after each step with the number of steps so far.
     """
     first = env.steps
     try:

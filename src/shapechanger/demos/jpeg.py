@@ -6,51 +6,34 @@ simplejpeg is imported on first use, because recordings without images need no d
 from __future__ import annotations
 
 import math
+from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.demos.episodes import Driver, Step
-from shapechanger.errors import DemosError, MissingExtra
+from shapechanger.errors import DemosError, MissingExtra, translate_errors
 from shapechanger.layout import Layout
 
 MAX_PIXELS: Final = 1 << 24
-"""Limit of decoded pixels. The header of a JPEG of a few hundred bytes can claim 4 * 10**9."""
-
+"""Limit of decoded pixels; the header of a JPEG of a few hundred bytes can claim 4 * 10**9."""
 _SCAN: Final = b"\xff\xda"  # Start of a scan (ITU-T T.81); in the scans 0xff is followed by 0.
 _MAX_SCANS: Final = 64  # Progressive JPEGs have about ten.
 _REMEDY: Final = "replace it with an intact copy, or remove it and its entry"
 
 
 def decode_picture(jpeg: bytes, name: str) -> NDArray[np.uint8]:
-    """Decode a JPEG.
-
-    Args:
-        jpeg: Its bytes.
-        name: How to name the image in errors.
-
-    Returns:
-        Red, green and blue, shape (height, width, 3).
-
-    Raises:
-        DemosError: If the image is damaged, or larger than `MAX_PIXELS`.
-        MissingExtra: If simplejpeg is not installed.
-    """
+    """Decode a JPEG to red, green and blue, shape (height, width, 3); `name` is for errors."""
     picture_size(jpeg, name)
     # Strict by default: a truncated image is an error, instead of being filled with grey.
     return _decoded("decode_jpeg", jpeg, name, colorspace="RGB")
 
 
 def encode_picture(pixels: NDArray[np.uint8], quality: int = 100) -> bytes:
-    """Encode pixels as a JPEG with full colour resolution.
+    """Encode red, green and blue, shape (height, width, 3), as a JPEG of a quality in percent.
 
-    Args:
-        pixels: Red, green and blue, shape (height, width, 3).
-        quality: JPEG quality in percent.
-
-    Raises:
-        MissingExtra: If simplejpeg is not installed.
+    Colours have the full resolution.
     """
     return _simplejpeg().encode_jpeg(
         np.ascontiguousarray(pixels), quality=quality, colorspace="RGB", colorsubsampling="444"
@@ -58,12 +41,7 @@ def encode_picture(pixels: NDArray[np.uint8], quality: int = 100) -> bytes:
 
 
 def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
-    """Return the width and height in the header of a JPEG, in pixels, without decoding it.
-
-    Args:
-        jpeg: Its bytes.
-        name: How to name the image in errors.
-    """
+    """Return the width and height in the header of a JPEG, in pixels, without decoding it."""
     if jpeg.count(_SCAN) > _MAX_SCANS:
         raise DemosError(f"The image {name} has more than {_MAX_SCANS} scans: {_REMEDY}.")
     height, width, *_ = _decoded("decode_jpeg_header", jpeg, name)
@@ -74,7 +52,7 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
 
 
 def is_grey(jpeg: bytes, name: str) -> bool:
-    """Return whether a JPEG has no colours; errors as in `picture_size`."""
+    """Return whether a JPEG has no colours."""
     return _decoded("decode_jpeg_header", jpeg, name)[2] == "Gray"
 
 
@@ -87,23 +65,18 @@ def _decoded(function: str, jpeg: bytes, name: str, **options: str) -> Any:
 
 
 def _simplejpeg() -> Any:
-    try:
-        import simplejpeg
-    except ImportError as error:
-        raise MissingExtra("simplejpeg", "data") from error
-    return simplejpeg
+    with translate_errors(ImportError, to=lambda _: MissingExtra("simplejpeg", "data")):
+        return import_module("simplejpeg")
 
 
+# Colour of each driver: M. Okabe, K. Ito, "Color universal design", 2008.
 COLOURS: Final[dict[Driver, tuple[int, int, int]]] = {
     "person": (0, 114, 178),
     "expert": (0, 158, 115),
     "policy": (230, 159, 0),
     "program": (153, 153, 153),
 }
-"""Colour of each driver: M. Okabe, K. Ito, "Color universal design", 2008."""
-
-BACKGROUND: Final = (24, 28, 34)
-"""Colour of the area below an image, and of episodes without a camera."""
+BACKGROUND: Final = (24, 28, 34)  # Below an image, and in episodes without a camera.
 _MIDDLE, _WANTED = (110, 118, 128), (255, 255, 255)
 _WIDTH, _BAR = 480, 14  # Minimum width, and height of one bar, pixels.
 
@@ -113,14 +86,7 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
 
     A bar starts at 0, or at the bound nearest to 0: steering to the left is a bar to the left. Its
     colour shows the driver; a white line shows the action of a policy while another driver drove.
-
-    Args:
-        picture: Shape (h, w, 3).
-        step: The step.
-        layout: Layout of its action.
-
-    Returns:
-        Shape (H, W, 3) with W at least 480; both sizes are even, as video codecs require.
+    The image of shape (h, w, 3) becomes at least 480 wide, with even sizes for video codecs.
     """
     times = max(1, math.ceil(_WIDTH / picture.shape[1]))
     large = picture.repeat(times, axis=0).repeat(times, axis=1)

@@ -35,16 +35,8 @@ _QUALITY: Final = 95  # JPEG quality of images that an env returns as arrays, pe
 class ObservationEncoder:
     """Splits the observations of an env into a JPEG and a state.
 
-    Args:
-        env: Its observations are an image, a state, or a Dict of `image` and `state`.
-
-    Attributes:
-        action_layout: Meaning of the values of an action.
-        state_layout: Meaning of the values of a state; None without a state.
-        has_picture: Whether observations contain images.
-
-    Raises:
-        DemosError: If the spaces are of another kind, or the env has no layouts.
+    Observations are an image, a state, or a Dict of `image` and `state`; `state_layout` is None
+    without a state. An env with other spaces, or without layouts, is refused.
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
@@ -77,7 +69,7 @@ class ObservationEncoder:
     ) -> tuple[bytes | None, tuple[float, ...]]:
         """Return the JPEG of an observation, None without images, and its state.
 
-        Values of the state that `info["absent"]` names, because they were not measured, are NaN.
+        Values that were not measured, according to `info["absent"]`, are NaN.
         """
         parts = self.parts(observation)
         jpeg: bytes | None = None
@@ -149,21 +141,15 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
     def decide(self, decision: Step) -> None:
         """Set the decision for the next step, if it differs from the action passed to `step`.
 
-        Args:
-            decision: The intended `action`, which is to be learned; its `driver`; and the action
-                `wanted` by a policy while another driver drives.
+        It has the intended `action`, which is to be learned; its `driver`; and the action `wanted`
+        by a policy while another driver drives.
         """
         self._decision = decision
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode, which is created on disk with its first step; close the previous one.
-
-        Args:
-            seed: As in `gymnasium.Env.reset`.
-            options: As in `gymnasium.Env.reset`.
-        """
+        """Begin an episode, which is written from its first step on; close the previous one."""
         self.end()
         observation, info = super().reset(seed=seed, options=options)
         self._see(observation, info)
@@ -250,23 +236,15 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         return observation, reward, terminated, truncated, info
 
     def mark(self, text: str = "") -> None:
-        """Mark the newest step, with free text.
-
-        Raises:
-            DemosError: If no episode is being recorded.
-        """
+        """Mark the newest step, with free text."""
         if self._writer is None:
             raise DemosError("No episode is being recorded: one begins with the first step.")
         self._writer.mark(text)
 
     def end(self, outcome: str = "") -> None:
-        """Close the episode, if one is open; the env goes on unrecorded until the next reset.
+        """Close the episode, if one is open, with how it ended.
 
-        Args:
-            outcome: How the episode ended; "" if unspecified.
-
-        Raises:
-            OutputError: If the header cannot be written; all steps are on disk nevertheless.
+        The steps that follow, until the next reset, are not recorded.
         """
         writer, self._writer = self._writer, None
         self._header = self._decision = None

@@ -38,13 +38,7 @@ _BINS: Final = 21  # Odd, so that 0 has its own bin in a symmetric range.
 
 
 class Distribution(NamedTuple):
-    """Numbers of the same name and unit.
-
-    Attributes:
-        feature: Name, unit and range of the numbers.
-        values: Finite numbers, shape (n,), at least one.
-        missing: Number of NaNs and infinities, which `values` omits.
-    """
+    """Finite numbers, shape (n,), of one name and unit; `missing` others are NaN or infinite."""
 
     feature: Feature
     values: NDArray[np.float64]
@@ -79,16 +73,7 @@ def distributions(episodes: Sequence[Episode]) -> list[Distribution]:
 
 
 def recording_html(name: str, episodes: Sequence[Episode], broken: Sequence[str] = ()) -> str:
-    """Render the report.
-
-    Args:
-        name: Name of the recording.
-        episodes: Episodes of the recording.
-        broken: A message for each episode that cannot be read.
-
-    Raises:
-        MissingExtra: If Jinja2 is not installed.
-    """
+    """Render the report of a recording; `broken` are messages on episodes that cannot be read."""
     per_episode = _MAX_PICTURES // max(1, len(episodes))
     pictures = min(_MAX_PER_EPISODE, max(_MIN_PER_EPISODE, per_episode))
     kept = [step for one in episodes for step in one.kept]

@@ -312,9 +312,7 @@ def load_clone(path: Path) -> Clone:
 
 
 def prepared(
-    card: PolicyCard,
-    pictures: NDArray[np.uint8] | None,
-    states: NDArray[np.floating] | None,
+    card: PolicyCard, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None
 ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32] | None]:
     """Return the inputs for the network of a clone; None for an input that it does not have.
 

@@ -20,8 +20,7 @@ AskedHead = Literal["auto", "class", "regression"]
 
 _MOST_CLASSES: Final = 16  # Actions are continuous if there are more different ones.
 _MIN_REPEATS: Final = 4  # Average number of occurrences of each action for classes.
-# Maximum error of a value within the tolerance, as a share of half its range.
-_TOLERANCE: Final = 0.1
+_TOLERANCE: Final = 0.1  # Largest error of a value, as a share of half its range.
 _BINS: Final = 10
 _WORST: Final = 12
 _MAX_POINTS: Final = 2000  # Largest number of actions in a chart.
@@ -31,7 +30,6 @@ _WORDS: Final = {
 }
 _PLACES: Final = ("low", "middle", "high")
 OUT_OF_RANGE: Final = "out of range"
-"""Class of an action outside its range."""
 
 
 def tercile_classes(
@@ -40,9 +38,8 @@ def tercile_classes(
     """Classify actions by the third of its range that each value is in.
 
     Each combination of thirds that occurs is a class. The extremes of the driver's actions replace
-    missing bounds. An action with a value outside its range, by more than the tolerance, is in the
-    class `OUT_OF_RANGE`. The names of the classes, and the class index of each action, shape (n,),
-    are returned.
+    missing bounds. An action with a value outside its range by more than the tolerance is in the
+    class `OUT_OF_RANGE`. Return the names of the classes, and each action's class index, (n,).
     """
     low, high = _ranges(driver, layout)
     share = (actions - low) / np.where(high > low, high - low, 1.0)
@@ -77,8 +74,7 @@ def output_fields(
 ) -> dict[str, Any]:
     """Choose the output encoding from the demonstrated actions, as fields of a `CloneNetwork`.
 
-    Actions have shape (n, m), and so have the mirrored ones, if images are mirrored. Too many
-    different actions for classes, and actions that are all equal, are refused.
+    Actions, and their mirror images if images are mirrored, have the shape (n, m).
     """
     both = actions if mirrored is None else np.concatenate((actions, mirrored))
     different, counts = np.unique(both, axis=0, return_counts=True)
@@ -116,13 +112,7 @@ def named(action: NDArray[np.floating], layout: Layout) -> str:
 
 
 class Bin(msgspec.Struct, frozen=True):
-    """Steps with similar confidence.
-
-    Attributes:
-        confidence: Mean probability of the chosen class.
-        accuracy: Share of steps with the driver's class.
-        steps: Number of steps.
-    """
+    """Mean confidence, accuracy and number of the steps with similar confidence."""
 
     confidence: float
     accuracy: float
@@ -133,8 +123,6 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
     """Evaluation of a policy.
 
     Attributes:
-        head: Kind of output.
-        steps: Number of steps.
         accuracy: Share of steps with the driver's class. For continuous actions, the share in which
             all values are in the same third of their range as the driver's, such as left, straight
             and right. The range is the layout's; the driver's extremes replace missing bounds.
@@ -146,7 +134,6 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
         calibration: Steps grouped by confidence; () for continuous actions.
         ece: Expected calibration error: mean difference of confidence and accuracy, weighted by
             steps; None for continuous actions.
-        numbers: Names of the values of an action.
         errors: Mean absolute error of each value, in its unit.
         within: Share of steps with every value within the tolerance.
         tolerance: Maximum error of such a value, as a share of half its range.
@@ -174,12 +161,7 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def evaluate(policy: Clone, data: Dataset) -> EvaluationResult:
-    """Compare a policy with the driver of demonstrations.
-
-    Raises:
-        PolicyError: If the layouts differ.
-        DemosError: If there is no step, or the data lack an input of the policy.
-    """
+    """Compare a policy with the driver of demonstrations of the same layouts."""
     policy.card.require_layouts(data.action_layout, data.state_layout)
     if not len(data):
         raise DemosError("There is no step to evaluate the policy on.")

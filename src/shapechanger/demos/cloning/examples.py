@@ -41,10 +41,8 @@ SplitBy = Literal["time", "episode"]
 class Mirror:
     """Effect of mirroring the world on the values of a layout.
 
-    Attributes:
-        order: Index of the value that each value comes from.
-        signs: Sign of each value, 1 or -1.
-        rightward: 1 if a larger value steers to the right, -1 to the left, 0 neither.
+    Each value comes from the index in `order`, times its sign, 1 or -1. `rightward` is 1 if a
+    larger value steers to the right, -1 to the left, and 0 if neither.
     """
 
     order: tuple[int, ...]
@@ -87,8 +85,8 @@ def mirror_of(layout: Layout) -> Mirror:
 def evaluated_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[np.bool_]:
     """Return a mask of the steps to hold out to evaluate a policy on: the last share, in [0, 1).
 
-    "time" takes that share of all steps of episodes of these lengths; "episode" takes whole
-    episodes from the end until they have it, but at least one, and leaves at least one.
+    `episodes` are lengths. By "time", the share is of all steps; by "episode", the last episodes
+    that have at least the share are held out, at least one, but never all.
     """
     if not 0.0 <= share < 1.0:
         raise DemosError(f"The held-out share must be in [0, 1), got {share}.")
@@ -116,11 +114,10 @@ def stretch(n: int, member: int, members: int, share: float) -> NDArray[np.bool_
 def augmented(
     pictures: Tensor, index: Tensor, augmentation: Augmentation, generator: torch.Generator
 ) -> tuple[Tensor, Tensor]:
-    """Return images with random changes of light, colour, noise and position, and their mirroring.
+    """Return randomly changed images in [0, 1], (batch, 3, height, width), and which are mirrored.
 
-    From uint8 images, shape (n, height, width, 3), those of an index in random order, shape
-    (batch,), become images in [0, 1], shape (batch, 3, height, width). The returned mask, shape
-    (batch,), is of the mirrored ones, whose actions must be mirrored too.
+    The images with these indices, shape (batch,), are taken from `pictures`, uint8 of the shape
+    (n, height, width, 3). The actions of mirrored images must be mirrored, too.
     """
     n = len(index)
 
@@ -175,13 +172,9 @@ and targets, (batch, m), or (batch,) for classes."""
 
 
 class Examples(NamedTuple):
-    """Training examples, with their mirror images.
+    """Prepared images, (n, height, width, 3), states, (n, 2, k), and targets of training examples.
 
-    Attributes:
-        pictures: Prepared images, shape (n, height, width, 3); None without images.
-        states: States and mirrored states, shape (n, 2, k); None without states.
-        targets: Target outputs and their mirror images: actions, shape (n, 2, m), or class
-            indices, shape (n, 2).
+    Targets are actions, (n, 2, m), or class indices, (n, 2); the second of two is mirrored.
     """
 
     pictures: NDArray[np.uint8] | None
@@ -194,8 +187,7 @@ class Examples(NamedTuple):
     ) -> Examples:
         """Return demonstrations as the policy of a card sees and learns them.
 
-        `mirrors` are of actions and states; None repeats the examples themselves. Demonstrations
-        that lack an input, or have an action out of range, are refused.
+        `mirrors` are of actions and states; None repeats the examples themselves.
         """
         pictures, states = prepared(card, data.pictures, data.states)
         if pictures is not None:  # PyTorch does not accept read-only arrays.
@@ -230,7 +222,7 @@ def batches(
     settings: CloneSettings,
     seed: int,
 ) -> Iterator[Batch]:
-    """Yield batches indefinitely, from the examples in a mask, shape (n,), and from a rehearsal.
+    """Yield batches forever, of the examples in a mask, shape (n,), and of a rehearsal.
 
     Each example is drawn once before any repeats.
     """

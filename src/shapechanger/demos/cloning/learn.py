@@ -14,10 +14,10 @@ import numpy as np
 
 from shapechanger.demos.cloning.clone import CloneSettings, settings_for
 from shapechanger.demos.cloning.evaluation import AskedHead, output_fields
-from shapechanger.errors import DemosError, MissingExtra, check_seed
+from shapechanger.errors import DemosError, MissingExtra, check_seed, translate_errors
 from shapechanger.policy import CloneNetwork, PolicyCard
 
-try:
+with translate_errors(ImportError, to=lambda _: MissingExtra("torch", "learn")):
     import torch
     from torch import Tensor
     from torch.nn import functional
@@ -32,8 +32,6 @@ try:
         stretch,
     )
     from shapechanger.demos.cloning.network import CameraNetwork, CameraPolicy, joined, seeded
-except ImportError as error:
-    raise MissingExtra("torch", "learn") from error
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
@@ -41,8 +39,7 @@ if TYPE_CHECKING:
 Inputs = Literal["auto", "picture", "state", "both"]
 """Inputs of a policy; "auto" takes images if there are any, and states otherwise."""
 
-# Error at which the loss changes from quadratic to linear, so that one mistake of the driver does
-# not outweigh ten small errors.
+# Error above which the loss is linear, so that one mistake does not outweigh ten small errors.
 _HUBER_BETA: Final = 0.1
 _MAX_INITIAL: Final = 0.95  # Keeps the initial output in the range where tanh can still learn.
 _MAX_GRADIENT: Final = 1.0
@@ -52,19 +49,15 @@ _AVERAGE_FROM: Final = 10.0
 # itself instead of looking.
 _APPLIED: Final = "/applied"
 _MIN_SPREAD: Final = 1e-6
-# From twice as confident to a fifth as confident.
-_TEMPERATURES: Final = torch.logspace(-0.3, 0.7, 101)
+_TEMPERATURES: Final = torch.logspace(-0.3, 0.7, 101)  # From twice to a fifth as confident.
 _MIN_CALIBRATION_STEPS: Final = 20
 
 
 class MemberCheck(msgspec.Struct, frozen=True):
-    """Validation of one member.
+    """Validation of one member after `step` training steps.
 
-    Attributes:
-        member: Index of the member.
-        step: Number of its training steps so far.
-        loss: Mean loss of the batches since the last validation; NaN at the start.
-        error: Error on the steps held out for early stopping, smaller is better; NaN without any.
+    `loss` is the mean of the batches since the last validation, NaN at the start; `error` is the
+    loss on the steps held out for early stopping, NaN without any.
     """
 
     member: int
@@ -75,14 +68,9 @@ class MemberCheck(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """Course of a training.
+    """Course of a training: validations, and the step of each member whose weights were kept.
 
-    Attributes:
-        checks: Validations of all members, in order; the first of each is from before training.
-        best_steps: Step of each member at which it was best, which was kept.
-        mirror_note: Share of mirrored images and its reason, in a sentence; "" if the settings
-            state the share.
-        seconds: Duration, s.
+    `mirror_note` states the share of mirrored images and its reason; "" if the settings state it.
     """
 
     checks: tuple[MemberCheck, ...]
@@ -103,34 +91,17 @@ def learn(
     symmetric: bool = False,
     on_check: Callable[[MemberCheck], None] = lambda check: None,
 ) -> tuple[CameraPolicy, Training]:
-    """Learn the actions of a driver.
+    """Learn the actions of a driver, and return the policy and the course of its training.
 
     The policy is the mean of several networks, each of which uses another stretch of time for early
     stopping. Equal arguments give an equal policy on the same machine with the same number of
     threads.
 
-    Args:
-        data: The demonstrations.
-        settings: Hyperparameters; None for `settings_for` the number of steps.
-        head: Kind of output.
-        inputs: Inputs of the policy.
-        seed: Seed of all randomness.
-        start: Policy to train further, which is not changed; one network then keeps its inputs and
-            outputs. None for a new one.
-        rehearsal: Demonstrations that `start` was trained on, mixed in so that they are not
-            forgotten; None without rehearsal.
-        symmetric: Whether the driver steers to both sides equally in the long run, as an expert in
-            random worlds does. The settings then state the share of mirrored images; otherwise it
-            depends on how evenly the driver steered.
-        on_check: Called after each validation.
-
-    Returns:
-        The policy, and the course of the training.
-
-    Raises:
-        DemosError: If the data are unsuitable, or the seed is not a whole number from 0 to
-            2^32 - 1.
-        PolicyError: If the layouts of the data differ from the layouts of `start`.
+    `start` is a policy of the same layouts to train further; its single network keeps its inputs
+    and outputs. `rehearsal` is data that it was trained on, mixed in so that they are not
+    forgotten. If the driver is `symmetric`, steering to both sides equally in the long run, as an
+    expert in random worlds does, the settings state the share of mirrored images; otherwise it
+    depends on how evenly the driver steered.
     """
     seed = check_seed(seed, DemosError)
     began = time.monotonic()
@@ -198,7 +169,7 @@ def learn(
 def _mirrors(
     data: Dataset, feels: bool, stated: float
 ) -> tuple[tuple[Mirror | None, Mirror | None], float, str]:
-    """Return the mirrors of actions and states, the share to mirror, and its reason."""
+    """Return the mirrors of actions and states, the share of mirrored images, and its reason."""
     try:
         mirror = mirror_of(data.action_layout)
         layout = data.state_layout

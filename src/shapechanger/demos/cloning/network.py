@@ -17,22 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.clone import Clone, CloneSettings, prepared
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import MissingExtra, translate_errors
 from shapechanger.layout import Layout
 from shapechanger.policy import STEERING, CloneNetwork, PolicyCard, export_network
 
-try:
+with translate_errors(ImportError, to=lambda _: MissingExtra("torch", "learn")):
     import torch
     from torch import Tensor, nn
     from torch.nn import functional
-except ImportError as error:
-    raise MissingExtra("torch", "learn") from error
 
-DIRECTIONS: Final = 6
-"""Number of edge directions over half a turn: 30 degrees each."""
-
-BRIGHTEST: Final = 255.0
-"""Largest value of a pixel."""
+DIRECTIONS: Final = 6  # Of edges, over half a turn: 30 degrees each.
+BRIGHTEST: Final = 255.0  # Largest value of a pixel.
 _CHUNK: Final = 256  # Examples at a time, to bound the memory.
 _CELL: Final = 4  # Side of a cell, pixels.
 # Added before the logarithm, as a share of full brightness: about a camera's noise in the dark.
@@ -190,7 +185,7 @@ class CameraPolicy(Clone):
     ) -> CameraPolicy:
         """Return an untrained policy of images, whose actions are in [-1, 1].
 
-        `seed` is of the weights; without `actions`, it steers any vehicle by steering and throttle.
+        Without `actions`, it steers any vehicle by steering and throttle.
         """
         if actions is not None and actions.names == STEERING:
             actions = None
@@ -238,10 +233,6 @@ class CameraPolicy(Clone):
         Its inputs are `picture`, uint8 of the shape (n, height, width, 3) that the card's framing
         gives, and `state`, float32 of shape (n, values); its output is `output`, float32: actions
         in [-1, 1], or probabilities of the card's classes.
-
-        Raises:
-            MissingExtra: If onnx or onnxscript is not installed.
-            OutputError: If the file cannot be written.
         """
         kinds = {"picture": torch.uint8, "state": torch.float32}
         shapes = self.card.shapes

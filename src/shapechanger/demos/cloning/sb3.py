@@ -17,21 +17,18 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from shapechanger.demos.cloning.network import CameraNetwork, CameraPolicy
-from shapechanger.errors import MissingExtra, PolicyError
+from shapechanger.errors import MissingExtra, PolicyError, translate_errors
 from shapechanger.policy import PolicyCard
 
-try:
+with translate_errors(ImportError, to=lambda _: MissingExtra("stable-baselines3", "learn")):
     from stable_baselines3 import PPO, SAC
     from stable_baselines3.common.policies import ActorCriticPolicy
     from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
 
 # Logarithm of the initial standard deviation of an action before it is squashed. A larger one would
 # drown the actions of the clone in noise.
 _LOG_STD: Final = -2.0
-# Raw images are large: SAC's default of a million would take 50 GB and more.
-_BUFFER: Final = 10_000
+_BUFFER: Final = 10_000  # Observations; SAC's default of a million images would take 50 GB.
 
 
 class NormedReLU(nn.Module):
@@ -99,16 +96,9 @@ def as_sac(
     """Return the policy as a SAC model on raw observations; its `save` writes a file.
 
     Its deterministic action equals the policy's. Its critics are untrained, and lead the actor
-    astray at first. `learning_starts` is 0, and the replay buffer holds 10,000 raw observations.
-
-    Args:
-        policy: The policy.
-        size: Rows and columns of the raw images; None for a policy without images.
-        seed: Seed of the learner.
-        **settings: Arguments of `stable_baselines3.SAC`, except the shape of the actor.
-
-    Raises:
-        PolicyError: If the policy has classes, which SAC does not support.
+    astray at first. `size` is the rows and columns of the raw images, None without images. The
+    settings are arguments of `stable_baselines3.SAC`; by default, `learning_starts` is 0, and the
+    replay buffer holds 10,000 observations.
     """
     if policy.net.classes:
         raise PolicyError("This policy has classes, but SAC needs the head regression: use PPO.")
@@ -137,8 +127,6 @@ def as_ppo(
 
     The actions of a policy with classes are indices of `policy.net.classes`: wrap the env in
     `gymnasium.wrappers.TransformAction`.
-
-    Its settings are arguments of `stable_baselines3.PPO`.
     """
     settings = {"device": "cpu", **settings}
     kwargs = _perception(policy) | {"net_arch": {"pi": [], "vf": [64, 64]}, "ortho_init": False}

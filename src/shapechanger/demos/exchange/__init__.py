@@ -67,11 +67,7 @@ _OWN: Final = (tub.FORMAT, minari.FORMAT, lerobot.FORMAT, csv_files.FORMAT, mcap
 
 @cache
 def formats() -> Mapping[str, Format]:
-    """Return all formats, keyed by name: our own, and formats of other packages' entry points.
-
-    Raises:
-        DemosError: If an entry point does not name a `Format`, or two formats have the same name.
-    """
+    """Return all formats, keyed by name: our own, and formats of other packages' entry points."""
     found = {form.name: form for form in _OWN}
     for point in entry_points(group=_GROUP):
         form = point.load()
@@ -84,20 +80,15 @@ def formats() -> Mapping[str, Format]:
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """Result of an import or an export.
+    """Result of an import or an export: the format, and numbers of what was written.
 
-    Attributes:
-        format: Name of the format.
-        episodes: Number of episodes written.
-        steps: Number of steps written.
-        pictures: Number of images of an import.
-        findings: Parts left out, contradictions in the source, and changes by an export.
+    Findings are parts left out, contradictions in the source, and changes by an export.
     """
 
     format: str
     episodes: int
     steps: int
-    pictures: int = 0
+    pictures: int = 0  # Of an import.
     findings: tuple[ImportFinding, ...] = ()
 
 
@@ -303,12 +294,7 @@ def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterato
 
 
 def find_format(path: Path) -> str:
-    """Detect the format of a folder.
-
-    Raises:
-        DemosError: If the folder does not exist, or has no known format, or several; the error
-            lists the formats.
-    """
+    """Detect the format of a folder; refuse a folder of no known format, or of several."""
     found = _formats_of(path)
     if len(found) == 1:
         return found[0]

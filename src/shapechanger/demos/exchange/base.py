@@ -75,8 +75,6 @@ _SLOWEST_HZ, _FASTEST_HZ = 1.0, 100.0  # Range of `control_hz` in a profile.
 _WHOLE: Final = ((1.0, 0.005), (5.0, 0.025))
 
 DEFAULT_HZ: Final = 20.0
-"""Steps per second of an episode without any information on its rate, Hz."""
-
 UNKNOWN_RATE: Final = f"The rate is unknown: {DEFAULT_HZ:g} Hz are assumed; --hz sets it."
 
 
@@ -86,8 +84,8 @@ class ExchangeRecord:
 
     Attributes:
         step: The step; its index and the name of its frame are ignored.
-        jpeg: JPEG of the step's image; the same object in successive records that share an image.
-            Readers leave it None, and `whole_records` sets it from `image`.
+        jpeg: JPEG of the step's image, which an import sets from `image`; the same object in
+            successive records that share an image.
         marks: Texts of the step's marks.
         dropped: Why the step is excluded; None if it is not excluded.
         name: Name of the record in findings.
@@ -139,13 +137,7 @@ class ImportFinding(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class ImportContext:
-    """Options of an import, and its findings so far.
-
-    Attributes:
-        camera: Name of the camera to import, if there are several; "" for the only one.
-        hz: Steps per second, as stated by the user; None to read or measure the rate.
-        strict: Whether to refuse a source that is incomplete or contradicts itself.
-    """
+    """Options of an import, see `import_recording`, and its findings so far."""
 
     camera: str = ""
     hz: float | None = None
@@ -155,15 +147,12 @@ class ImportContext:
     )
 
     def report(self, kind: Kind, text: str, name: str = "") -> None:
-        """Add a finding; parts with the same kind and text are listed together.
+        """Add a finding; with `strict`, a warning or a part that is left out is an error.
 
         Args:
             kind: Kind of the finding.
-            text: A sentence; or with `name`, the reason for that part.
+            text: A sentence; or with `name`, the reason, with which all such parts are listed.
             name: The part of the source, such as a record; "" if the finding is about all of it.
-
-        Raises:
-            DemosError: If `strict` is set and the kind is not "note".
         """
         names = self._found.setdefault((kind, text), [])
         names += [name] if name else []
@@ -183,19 +172,12 @@ class ImportContext:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportContext:
-    """Options of an export.
-
-    Attributes:
-        out: The folder that the user asked for; the writer's folder is renamed to it at the end.
-        task: What the robot does, in words; "" if not given.
-        images: Whether to store images as they were recorded, instead of video.
-        rewarded: Whether all steps have a reward.
-    """
+    """Options of an export, see `export_recording`; the writer's folder is renamed to `out`."""
 
     out: Path
     task: str = ""
     images: bool = False
-    rewarded: bool = False
+    rewarded: bool = False  # Whether all steps have a reward.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -296,15 +278,10 @@ def drives(
 ) -> Iterator[tuple[list[ExchangeRecord], EpisodeHeader]]:
     """Yield the drives of a source that may lack its rate and the size of its images.
 
-    Sessions are split at pauses and where time runs backwards. Records with a damaged image, or an
-    image of another size than most, are left out before rates and pauses are measured. If the times
-    contradict a stated rate, they are left out.
-
-    Args:
-        sessions: Records with their time as `captured_ns`, from one start of the robot to the next.
-        header: Metadata of all drives; rate, size of images and clock are filled in.
-        context: Options of the import, to which findings are added.
-        stated_hz: Steps per second according to the source; None if it does not state a rate.
+    Sessions, from one start of the robot to the next, are split at pauses and where time runs
+    backwards; their records have `captured_ns`. Records with a damaged image, or an image of
+    another size than most, are left out before rates and pauses are measured. `stated_hz` is the
+    rate that the source states; times that contradict it are left out.
     """
     sizes = [_loaded(record)[1] for record in chain(*sessions)]
     ((common, _),) = Counter(filter(None, sizes)).most_common(1) or [(None, 0)]

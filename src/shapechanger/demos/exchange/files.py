@@ -30,12 +30,8 @@ from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
 from shapechanger.errors import DemosError, LayoutError, MissingExtra, OutputError, translate_errors
 from shapechanger.files import read_file, writing
 
-MAX_UNPACKED: Final = 64 << 20
-"""Unpacked bytes that are allowed for any file, and in memory. `MAX_PIXELS` need 48 MiB."""
-
-MAX_VALUES: Final = 1 << 17
-"""Largest number of values of a feature."""
-
+MAX_UNPACKED: Final = 64 << 20  # Unpacked bytes in memory; `MAX_PIXELS` need 48 MiB.
+MAX_VALUES: Final = 1 << 17  # Of a feature.
 _JPEG: Final = b"\xff\xd8"
 _PNG: Final = b"\x89PNG"
 _PNG_DEPTH: Final = slice(24, 25)  # Byte of a PNG with the number of bits per value.
@@ -43,22 +39,15 @@ _PNG_DEPTH: Final = slice(24, 25)  # Byte of a PNG with the number of bits per v
 
 def library(name: str, extra: str = "data") -> Any:
     """Import a module of a package that an extra installs."""
-    try:
+    with translate_errors(ImportError, to=lambda _: MissingExtra(name.split(".")[0], extra)):
         return import_module(name)
-    except ImportError as error:
-        raise MissingExtra(name.split(".")[0], extra) from error
 
 
 @contextmanager
 def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
-    """Create a folder that is renamed to `out` on success and removed on failure.
+    """Yield a hidden folder that is renamed to `out` on success, and removed on failure.
 
-    Args:
-        out: The folder to create; it must not exist.
-        source: A folder that `out` must not lie in, because it is read meanwhile; or None.
-
-    Yields:
-        A hidden folder next to `out` to write to.
+    `out` must not exist, nor lie in the folder `source`, which is read at the same time.
     """
     if os.path.lexists(out):
         raise DemosError(f"{out} exists already: choose another name, or move it away.")
@@ -97,7 +86,7 @@ def inside(folder: Path, name: str, named_by: object) -> Path:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a regular file."""
+    """Return the content of a regular file of at most `MAX_TEXT_BYTES`."""
     try:
         return read_file(path, MAX_TEXT_BYTES)
     except OSError as error:
@@ -125,14 +114,10 @@ def read_table(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def load_jpeg(image: Path | bytes | NDArray[np.uint8]) -> tuple[bytes, tuple[int, int]]:
-    """Return an image as JPEG, with its width and height; other kinds get JPEG quality 100.
+    """Return an image as JPEG, with its width and height; PNG and BMP get JPEG quality 100.
 
-    Args:
-        image: A file or its content, as JPEG, PNG or BMP; or pixels, shape (height, width, 3).
-
-    Raises:
-        DemosError: If the image is missing, damaged, of another kind, or too large. The message
-            is a noun phrase, such as "an empty image".
+    The image is a file, its content, or pixels, shape (height, width, 3). Errors are noun phrases,
+    such as "an empty image".
     """
     if isinstance(image, np.ndarray):
         return encode_picture(image), (image.shape[1], image.shape[0])
@@ -161,10 +146,7 @@ def load_jpeg(image: Path | bytes | NDArray[np.uint8]) -> tuple[bytes, tuple[int
 
 
 def image_size(shape: Sequence[int], channels: Sequence[int] = (1, 3)) -> tuple[int, int] | None:
-    """Return the width and height of images from the shape of their pixels, colours first or last.
-
-    Return None if the shape is not the shape of an image, or has more than `MAX_PIXELS`.
-    """
+    """Return the width and height of images with this shape, colours first or last; or None."""
     if len(shape) not in {2, 3}:
         return None
     is_last = len(shape) == 2 or shape[-1] in channels
@@ -204,9 +186,7 @@ def read_json(path: Path, kind: Any = dict[str, Any]) -> Any:
     return parse_json(read_text(path), path, kind)
 
 
-class _Own(msgspec.Struct):
-    """Shapechanger's section of a dataset: fields of each header, with the outcome and drivers."""
-
+class _Own(msgspec.Struct):  # Fields of each header, with the outcome and drivers.
     format: Literal[1]
     episodes: list[dict[str, Any]]
 
@@ -219,8 +199,8 @@ def own_episodes(
 ) -> list[tuple[EpisodeHeader, str, Iterator[Driver]]]:
     """Return the header, the outcome and the drivers of each episode that Shapechanger exported.
 
-    The section must have `count` episodes, with the sizes of layouts and images in `found`. A
-    dataset that Shapechanger did not export has the section None; return [].
+    The section must have `count` episodes, with layouts and images of the sizes in `found`. It is
+    None in datasets of other programs, for which [] is returned.
     """
     if section is None:
         return []

@@ -57,9 +57,7 @@ _DESCRIPTION: Final = (
 )
 
 
-class _Rest(msgspec.Struct):
-    """Content of `infos/step` in our datasets: fields of a step that have no column."""
-
+class _Rest(msgspec.Struct):  # Content of `infos/step`: fields of a step that have no column.
     step: dict[str, Any]
     marks: tuple[str, ...]
     dropped: str | None
@@ -85,7 +83,6 @@ class _Space(msgspec.Struct, kw_only=True):
     high: Any = 1
     start: Any = 0
     n: Any = 0
-    nvec: Any = 0
     subspaces: dict[str, _Space] | list[_Space] = []
 
     def leaves(self, column: str) -> Iterator[tuple[str, _Space]]:
@@ -108,14 +105,6 @@ class _Space(msgspec.Struct, kw_only=True):
                 shape = (0,) if len(shape) > 1 and self.dtype in _DEEP else shape
             case "Discrete":
                 low, high = self.start, self.start + self.n - 1
-            case "MultiDiscrete":
-                shape, low, high = (
-                    np.shape(self.nvec),
-                    self.start,
-                    np.add(self.start, self.nvec) - 1,
-                )
-            case "MultiBinary":
-                shape = tuple(np.atleast_1d(self.n).tolist())
             case _:
                 return []
         if not 0 < (size := math.prod(shape)) <= MAX_VALUES:
@@ -186,8 +175,9 @@ class _Dataset:
         except (TypeError, ValueError) as error:
             raise DemosError(f"A space in {path} is damaged: {error}.") from error
         if len(self._action) < len(acted):
-            names = "Box, Discrete, MultiDiscrete or MultiBinary"
-            raise DemosError(f"{path}: the action_space must consist of {names} of few values.")
+            raise DemosError(
+                f"{path}: the action_space must consist of Box or Discrete of few values."
+            )
         hz = about.control_hz or context.hz
         if hz is None or not 0.0 < hz < math.inf:
             context.report("note", base.UNKNOWN_RATE)

@@ -57,9 +57,7 @@ _MAX_MS: Final = 2 * 10**12
 Time = Annotated[float, Meta(gt=-_MAX_MS, lt=_MAX_MS)] | None
 
 
-class _Record(Struct):
-    """Columns that have the same meaning in all tubs."""
-
+class _Record(Struct):  # Columns that have the same meaning in all tubs.
     time_ms: Time = field(default=None, name="_timestamp_ms")
     mode: str = field(default="user", name=_MODE)
     user_angle: Axis = field(default=None, name=_USER[0])
@@ -68,9 +66,7 @@ class _Record(Struct):
     pilot_throttle: Axis = field(default=None, name=_PILOT[1])
 
 
-class _Catalogs(Struct):
-    """The last line of a manifest."""
-
+class _Catalogs(Struct):  # The last line of a manifest.
     paths: list[str]
     deleted_indexes: list[int] = []
     current_index: int = 0
@@ -195,10 +191,7 @@ def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEp
     parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
     states = [feature for name in sensed for feature in base.features_of(name, 1)]
     header = EpisodeHeader(
-        action_layout=_ACTIONS,
-        state_layout=Layout(tuple(states)),
-        body="car",
-        source="tub",
+        action_layout=_ACTIONS, state_layout=Layout(tuple(states)), body="car", source="tub"
     )
     rate = _float(tub.rate)
     for part, head in base.drives(parts, header, context, rate if 0.0 < rate < math.inf else None):

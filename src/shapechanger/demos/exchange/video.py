@@ -20,19 +20,14 @@ from shapechanger.demos.exchange.files import MAX_UNPACKED, library
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError, OutputError, translate_errors
 
+# `crf` is the quality, from 0 (lossless) to 51; docs/exchange.md has the measured error. Every
+# second image is a key frame, so that learners can read single images quickly.
+_CODING: Final = {"crf": "18", "g": "2", "bf": "0"}
 _MAX_SAMPLES: Final = 1 << 21  # Images of a video: 10 hours at 60 Hz. FFmpeg's index has 50 MB.
 
 
 class VideoWriter:
-    """Writer of an H.264 video with 4:2:0 colours and a constant rate.
-
-    Attributes:
-        frames: Number of images written.
-    """
-
-    # `crf` is the quality, from 0 (lossless) to 51; docs/exchange.md has the measured error. Every
-    # second image is a key frame, so that learners can read single images quickly.
-    _CODING: Final = {"crf": "18", "g": "2", "bf": "0"}
+    """Writer of an H.264 video of `frames` images with 4:2:0 colours and a constant rate."""
 
     def __init__(self, path: Path, size: tuple[int, int], rate: Fraction) -> None:
         width, height = size
@@ -46,7 +41,7 @@ class VideoWriter:
         to = {"format": "mp4", "options": {"movflags": "+faststart"}}
         self._file = self._av.open(f"file:{path.absolute()}", "w", **to)
         about = {"width": width, "height": height, "pix_fmt": "yuv420p"}
-        self._images = self._file.add_stream("libx264", rate, options=self._CODING, **about)
+        self._images = self._file.add_stream("libx264", rate, options=_CODING, **about)
 
     def add(self, pixels: NDArray[np.uint8]) -> None:
         """Append an image, shape (height, width, 3)."""
@@ -65,19 +60,12 @@ class VideoWriter:
 
 
 class VideoTimes(NamedTuple):
-    """When the images of a video are shown, in ticks of its clock.
+    """When the images of a video are shown, in ticks of its clock."""
 
-    Attributes:
-        ticks: Times, ascending, shape (n,).
-        keys: Decoding times of the key frames from which to decode the images, shape (n,).
-        tick_s: Length of a tick, s.
-        size: Width and height of the images, pixels.
-    """
-
-    ticks: NDArray[np.int64]
-    keys: NDArray[np.int64]
+    ticks: NDArray[np.int64]  # Ascending, shape (n,).
+    keys: NDArray[np.int64]  # Decoding times of the key frames to start from, shape (n,).
     tick_s: Fraction
-    size: tuple[int, int]
+    size: tuple[int, int]  # Width and height, pixels.
 
     @property
     def seconds(self) -> NDArray[np.float64]:
