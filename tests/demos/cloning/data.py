@@ -103,10 +103,7 @@ SMALL: Final = CloneSettings(
 def corridor(n: int, seed: int, gain: float = 1.0) -> Dataset:
     """Return images of a door ahead in any light, with the actions of a driver towards it.
 
-    Args:
-        n: Number of images.
-        seed: Seed of places, light and noise.
-        gain: Steering gain; another vehicle needs more, or less.
+    Vehicles differ in their steering gain.
     """
     rng = np.random.default_rng(seed)
     place = rng.uniform(-1.0, 1.0, n)

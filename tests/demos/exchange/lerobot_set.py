@@ -60,19 +60,9 @@ def write_set(
 ) -> Path:
     """Write a dataset in which the first action and the image show the number of the step.
 
-    Args:
-        folder: The folder to create.
-        lengths: Steps of each episode.
-        fps: Steps per second.
-        video_fps: Images per second, if it differs from `fps`.
-        pictures: Numbers of the images; None for an image for each step.
-        options: Further options of FFmpeg.
-        rows: Changes the rows of the data.
-        places: Changes the rows of `meta/episodes`.
-        features: Further features.
-        columns: Further columns of the data.
-        info: Changes to `info.json`.
-        video: Whether there is a video.
+    Episodes have these lengths. The video shows the images of these numbers, by default one for
+    each step, and is encoded with these options of FFmpeg. `rows` and `places` change the rows of
+    the data and of `meta/episodes`; the others add features and columns, and change `info.json`.
     """
     total = sum(lengths)
     numbers = [(e, n) for e, length in enumerate(lengths) for n in range(length)]

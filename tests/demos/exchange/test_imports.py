@@ -156,77 +156,43 @@ def test_minari_loads_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert dataset.observation_space["image"].contains(episode.observations["image"][0])
 
 
-def _foreign(
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    observation_space: gym.Space[Any],
-    action_space: gym.Space[Any],
-    observations: Any,
-    actions: Any,
-    *,
-    jpeg: bool = False,
-) -> Path:
-    """Create a dataset of one episode with Minari itself."""
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder))
-    steps = len(actions)
-    buffer = EpisodeBuffer(
-        observations=observations,
-        actions=actions,
-        rewards=[1.0] * steps,
-        terminations=[False] * (steps - 1) + [True],
-        truncations=[False] * steps,
-        infos={},
-    )
-    with pytest.warns(UserWarning, match="is set to None|env_spec is None"):
-        minari.create_dataset_from_buffers(
-            "others/set-v3",
-            [buffer],
-            observation_space=observation_space,
-            action_space=action_space,
-            jpeg_encoding=jpeg,
-        )
-    return folder / "others/set-v3"
-
-
-def test_states_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = _foreign(
-        tmp_path,
-        monkeypatch,
-        gym.spaces.Dict({"goal": gym.spaces.Box(-1, 1, (2,)), "at": gym.spaces.Discrete(9)}),
-        gym.spaces.Discrete(3, start=1),
-        {"goal": np.full((4, 2), 0.5, np.float32), "at": np.arange(4)},
-        np.array([1, 2, 3]),
-    )
-    (episode,) = import_episodes(path)
-    head = episode.header
-    assert head.state_layout.names == ("at", "goal/0", "goal/1")
-    (action,) = head.action_layout
-    assert (action.low, action.high) == (1.0, 3.0)
-    read = [record.step for record in episode.records]
-    assert [step.action for step in read] == [(1.0,), (2.0,), (3.0,)]
-    assert [step.state for step in read] == [(0.0, 0.5, 0.5), (1.0, 0.5, 0.5), (2.0, 0.5, 0.5)]
-    assert read[-1].terminated
-    assert find_format(path) == "minari"
-
-
 @pytest.mark.parametrize("jpeg", [True, False])
 def test_images_of_other_minari_datasets(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jpeg: bool
 ) -> None:
+    """Datasets that Minari itself wrote."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     pixels = np.zeros((3, 40, 48, 3), np.uint8)
     pixels[:, :, :, 0] = np.arange(48) * 5
     pixels[:, :, :, 2] = 120
-    path = _foreign(
-        tmp_path,
-        monkeypatch,
-        gym.spaces.Box(0, 255, (40, 48, 3), np.uint8),
-        gym.spaces.Box(-1, 1, (2,)),
-        pixels,
-        np.zeros((2, 2), np.float32),
-        jpeg=jpeg,
+    buffer = EpisodeBuffer(
+        observations={"camera": pixels, "goal": np.full((3, 2), 0.5), "at": np.arange(3)},
+        actions=np.array([1, 2]),
+        rewards=[1.0, 1.0],
+        terminations=[False, True],
+        truncations=[False, False],
+        infos={},
     )
+    camera, goal = gym.spaces.Box(0, 255, (40, 48, 3), np.uint8), gym.spaces.Box(-1, 1, (2,))
+    observed = {"camera": camera, "goal": goal, "at": gym.spaces.Discrete(9)}
+    with pytest.warns(UserWarning, match="is set to None|env_spec is None"):
+        minari.create_dataset_from_buffers(
+            "others/set-v3",
+            [buffer],
+            observation_space=gym.spaces.Dict(observed),
+            action_space=gym.spaces.Discrete(3, start=1),
+            jpeg_encoding=jpeg,
+        )
+    path = tmp_path / "others/set-v3"
+    assert find_format(path) == "minari"
     import_recording(path, tmp_path / "data")
     (episode,) = all_of(tmp_path / "data")
+    assert episode.header.state_layout.names == ("at", "goal/0", "goal/1")
+    (action,) = episode.header.action_layout
+    assert (action.low, action.high) == (1.0, 3.0)
+    assert [step.action for step in episode.steps] == [(1.0,), (2.0,)]
+    assert [step.state for step in episode.steps] == [(0.0, 0.5, 0.5), (1.0, 0.5, 0.5)]
+    assert episode.steps[-1].terminated
     assert episode.header.image_size == (48, 40)
     stored = episode.jpeg(episode.steps[0])
     assert stored is not None
@@ -234,7 +200,7 @@ def test_images_of_other_minari_datasets(
     assert far.max() <= (24 if jpeg else 3)
     if jpeg:
         with h5py.File(path / "data/main_data.hdf5") as file:
-            assert stored == bytes(file["episode_0/observations"][0])
+            assert stored == bytes(file["episode_0/observations/camera"][0])
 
 
 def test_a_source_that_is_not_whole_is_refused_or_collected(tmp_path: Path) -> None:
