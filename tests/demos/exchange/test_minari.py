@@ -135,6 +135,7 @@ def test_parts_of_observations_are_imported_or_named(tmp_path: Path) -> None:
             "mission": gym.spaces.Text(9),
             "near": STATE,
             "points": gym.spaces.Box(-1.0, 1.0, (300, 500)),
+            "switches": gym.spaces.MultiBinary(3),
         }
     )
     done = import_recording(write_set(tmp_path / "set", observed), tmp_path / "back")
@@ -142,6 +143,7 @@ def test_parts_of_observations_are_imported_or_named(tmp_path: Path) -> None:
     header = all_of(tmp_path / "back")[0].header
     assert header.state_layout.names == ("near/0", "near/1")
     kinds = {"depth": "Box", "flat": "Box", "points": "Box", "mission": "Text"}
+    kinds["switches"] = "MultiBinary"
     text = findings_of(done)
     assert all(f"The observation {name} ({kind} " in text for name, kind in kinds.items())
     assert text.count("is not imported") == len(kinds)

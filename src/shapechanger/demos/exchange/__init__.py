@@ -114,8 +114,6 @@ def export_recording(
     Raises:
         DemosError: If the recording is damaged or does not fit the format, or `out` exists or lies
             in `data`.
-        UnknownName: If there is no such format.
-        OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
     """
     form = formats().get(format)
@@ -229,7 +227,6 @@ def import_episodes(path: Path, context: ImportContext | None = None) -> Iterato
 
     Raises:
         DemosError: If something is damaged or missing, possibly while an episode is iterated.
-        MissingExtra: If a package that the format needs is not installed.
     """
     yield from _read(path, "auto", context or ImportContext(strict=True))[1]
 
@@ -256,8 +253,6 @@ def import_recording(
     Raises:
         DemosError: If `path` has no intact episode, or `strict` is set and a part is damaged, or
             `out` exists or lies in `path`.
-        UnknownName: If there is no such format.
-        OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
     """
     context = ImportContext(camera=camera, hz=hz, strict=strict)

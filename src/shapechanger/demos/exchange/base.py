@@ -211,7 +211,7 @@ class Format:
 
 
 def few(names: Sequence[object]) -> str:
-    """List the first few names and count all, such as "12, 15, 20, ... (289 in all)"."""
+    """List up to three names, such as "12, 15, 20, ... (289 in all)"."""
     shown = ", ".join(map(str, names[:3]))
     return f"{shown}, ... ({len(names)} in all)" if len(names) > 3 else shown
 

@@ -32,8 +32,7 @@ from shapechanger.files import read_file, writing
 
 MAX_UNPACKED: Final = 64 << 20  # Unpacked bytes in memory; `MAX_PIXELS` need 48 MiB.
 MAX_VALUES: Final = 1 << 17  # Of a feature.
-_JPEG: Final = b"\xff\xd8"
-_PNG: Final = b"\x89PNG"
+_JPEG, _PNG = b"\xff\xd8", b"\x89PNG"
 _PNG_DEPTH: Final = slice(24, 25)  # Byte of a PNG with the number of bits per value.
 
 
@@ -127,22 +126,22 @@ def load_jpeg(image: Path | bytes | NDArray[np.uint8]) -> tuple[bytes, tuple[int
         raise DemosError(f"an image that cannot be read ({error.strerror})") from error
     if not data.strip(b"\0"):
         raise DemosError("an empty image")
-    if len(data) > MAX_PICTURE_BYTES:
-        raise DemosError(f"an image of more than {MAX_PICTURE_BYTES} bytes")
-    is_jpeg = data.startswith(_JPEG)
-    if not is_jpeg and not data.startswith((_PNG, b"BM")):
-        raise DemosError("an image that is not JPEG, PNG or BMP")
+    if not data.startswith((_JPEG, _PNG, b"BM")) or len(data) > MAX_PICTURE_BYTES:
+        raise DemosError(
+            f"an image that is not JPEG, PNG or BMP, or above {MAX_PICTURE_BYTES} bytes"
+        )
     if data.startswith(_PNG) and data[_PNG_DEPTH] == b"\x10":
         raise DemosError("an image of more than 8 bits a value, like that of a depth camera")
     try:
-        pixels = decode_picture(data, "") if is_jpeg else _pixels(data)
+        pixels = decode_picture(data, "") if data.startswith(_JPEG) else _pixels(data)
     except MissingExtra:
         raise
     except Exception as error:  # Pillow's errors have no common base.
         raise DemosError("a damaged image") from error
     if pixels is None:
         raise DemosError(f"an image that is partly transparent, or above {MAX_PIXELS} pixels")
-    return data if is_jpeg else encode_picture(pixels), (pixels.shape[1], pixels.shape[0])
+    jpeg = data if data.startswith(_JPEG) else encode_picture(pixels)
+    return jpeg, (pixels.shape[1], pixels.shape[0])
 
 
 def image_size(shape: Sequence[int], channels: Sequence[int] = (1, 3)) -> tuple[int, int] | None:

@@ -226,19 +226,7 @@ class _Dataset:
         return _PLACE.sub(lambda at: about[at[1]].rjust(int(at[2] or 0), "0"), template)
 
     def _times(self, name: str) -> VideoTimes:
-        """Return the times of a video; refuse a video that does not fit its episodes."""
-        if name not in self._videos:
-            try:
-                self._videos[name] = self._checked_times(name)
-            except DemosError as error:  # The next episode of this video is refused at once.
-                self._videos[name] = error
-        times = self._videos[name]
-        if isinstance(times, DemosError):
-            raise times
-        return times
-
-    def _checked_times(self, name: str) -> VideoTimes:
-        """Read the times of a video, and compare them with those of its episodes."""
+        """Read the times of a video; refuse a video that does not fit its episodes."""
         times = read_times(files.inside(self._folder, name, self._folder / EPISODES))
         if times.size != self._size:
             raise DemosError(f"{name} has images of {times.size} pixels, not {self._size}.")
@@ -247,11 +235,11 @@ class _Dataset:
         steps_s = np.diff(times.seconds)
         half_s = 0.5 * float(np.median(steps_s)) if len(steps_s) else 0.5 / self._info.fps
         shown_s = times.seconds[[0, -1]] + [0.0, 2.0 * half_s]
-        told_s = spans_s[[0, -1], [0, 1]]
-        lost_s = (shown_s - told_s) * [1.0, -1.0]  # Missing time at the start and at the end.
-        about = "{} shows {:.4g} to {:.4g} s where {} says {:.4g} to {:.4g} s".format(
-            name, *shown_s, EPISODES, *told_s
-        )
+        stated_s = spans_s[[0, -1], [0, 1]]
+        lost_s = (shown_s - stated_s) * [1.0, -1.0]  # Missing time at the start and at the end.
+        (first, last), (start, end) = shown_s, stated_s
+        about = f"{name} shows {first:.4g} to {last:.4g} s where {EPISODES} says "
+        about += f"{start:.4g} to {end:.4g} s"
         # After a lost image, the later images are shifted, and it is unknown which one was lost.
         if lost_s.max() > half_s:
             raise DemosError(f"{about}.")
@@ -264,7 +252,14 @@ class _Dataset:
     def _filmed(self, entry: _Entry) -> Iterator[NDArray[np.uint8]]:
         """Yield the image of each step of an episode; refuse an episode with a missing image."""
         name = self._video_name(entry)
-        times = self._times(name)
+        if name not in self._videos:
+            try:
+                self._videos[name] = self._times(name)
+            except DemosError as error:  # The next episode of this video is refused at once.
+                self._videos[name] = error
+        times = self._videos[name]
+        if isinstance(times, DemosError):
+            raise times
         at_s = entry.from_timestamp + np.arange(entry.length) / self._info.fps
         most_s = _TOLERANCE_S + _ROUNDING * at_s + 0.5 * float(times.tick_s)
         nearest = np.searchsorted((times.seconds[1:] + times.seconds[:-1]) / 2.0, at_s)
@@ -295,7 +290,11 @@ class _Dataset:
                 (ended,) = one.get(_TERMINATED, [is_done])
                 image = next(images) if images else None
                 for name in self._stored:
-                    image = _bytes(batch.column(name)[row].as_py())
+                    match batch.column(name)[row].as_py():
+                        case {"bytes": bytes() as image}:
+                            pass
+                        case _:
+                            image = b""
                     self._most_bytes -= 0 if image == read else len(image)
                     read = image
                     if self._most_bytes < 0:
@@ -316,14 +315,6 @@ class _Dataset:
                 )
         if done < entry.length:
             raise DemosError(f"The data have {done} of the {entry.length} rows of {where}.")
-
-
-def _bytes(image: Any) -> bytes:
-    match image:
-        case {"bytes": bytes() as data}:
-            return data
-        case _:
-            return b""
 
 
 def _flat_names(plain: Any) -> tuple[str, ...]:

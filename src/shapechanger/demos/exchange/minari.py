@@ -370,7 +370,7 @@ def _write(
 def _write_episode(group: Any, episode: base.ExchangeEpisode, greys: set[bool]) -> list[Step]:
     """Write the columns of an episode to its group, and return its steps.
 
-    If the last step does not end the episode, it is marked as truncated, so that learners do not
+    A last step that does not end the episode is marked as truncated, so that learners do not
     continue with the next episode. `greys` collects whether images are grey.
     """
     header, variable = episode.header, library("h5py").vlen_dtype(np.uint8)

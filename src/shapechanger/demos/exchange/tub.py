@@ -261,11 +261,7 @@ def _find_images(
 
 
 def _write(episodes: Sequence[base.ExchangeEpisode], folder: Path, _: base.ExportContext) -> int:
-    """Write episodes as the sessions of one tub of version 2.
-
-    Actions of people, experts and programs are written as `user/...`, those of policies as
-    `pilot/...`.
-    """
+    """Write episodes as the sessions of one tub of version 2."""
     states = episodes[0].header.state_layout
     (folder / _IMAGES).mkdir()
     records: list[Fields] = []
@@ -327,24 +323,22 @@ def _timed(
 ) -> Iterator[tuple[Step, bytes | None, int]]:
     """Yield the steps with their images and ascending Unix times, ns.
 
-    Steps of a simulated drive get the times of the simulated clock, because the recorder's times
-    depend on the speed of the simulation. A step without a time gets the time of the step before
-    plus one period.
+    In a simulation, times are of the simulated clock, because the recorder's times depend on the
+    speed of the simulation. A step without a time follows the step before after one period.
     """
     header = episode.header
     is_simulated = header.clock == "twin" or (header.clock == "none" and header.env)
-    first_ns: int | None = None
-    last_ns: int | None = None
-    for record in episode.records:
-        step = record.step
-        at_ns, clock_ns = step.wall_ns, step.clock_ns
+    period_ns, first_ns = round(_NS_PER_S / header.control_hz), None
+    last_ns = began_ns - period_ns
+    for number, record in enumerate(episode.records):
+        at_ns, clock_ns = record.step.wall_ns, record.step.clock_ns
         first_ns = clock_ns if first_ns is None else first_ns
         if is_simulated:
             at_ns = None if clock_ns is None else began_ns + clock_ns - (first_ns or 0)
-        if at_ns is None or (last_ns is not None and at_ns <= last_ns):
-            at_ns = began_ns if last_ns is None else last_ns + round(_NS_PER_S / header.control_hz)
+        if at_ns is None or (number and at_ns <= last_ns):
+            at_ns = last_ns + period_ns
         last_ns = at_ns
-        yield step, record.jpeg, at_ns
+        yield record.step, record.jpeg, at_ns
 
 
 def _began(header: EpisodeHeader) -> datetime:
