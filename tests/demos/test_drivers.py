@@ -53,7 +53,7 @@ def test_only_corrections_are_learned_from(tmp_path: Path) -> None:
     assert [s.driver for s in episode.steps] == ["policy"] * 2 + ["expert"] * 23
     before, after = episode.steps[1:3]
     assert (before.action, before.wanted) == ((-1.0, 0.5), None)
-    # Without the mistakes that the expert makes when it drives alone.
+    # While it corrects a policy, the expert makes no mistakes.
     assert (after.action, after.wanted, after.applied) == ((0.0, 0.5), (-1.0, 0.5), (0.0, 0.25))
     assert [mark.step for mark in episode.marks] == [2]
     assert len(load_dataset(tmp_path)) == 23
@@ -90,7 +90,7 @@ class Corrected:
     ],
 )
 def test_who_drives(gaps: list[float], dangers: tuple[int, ...], drivers: str) -> None:
-    """Of steps of 0.1 s: the expert takes over after 0.3 s, and hands back after 1 s."""
+    """Steps last 0.1 s: the expert takes over after 0.3 s, and the policy drives on after 1 s."""
     one = Corrected()
     steps = enumerate(gaps)
     found = [one.decide(RIGHT + np.array([gap, 0.0]), danger=n in dangers) for n, gap in steps]
@@ -134,7 +134,7 @@ def clone(path: Path, observation: Layout | None = None) -> str:
 def test_a_policy_gets_its_part_of_the_observation(
     shows: Shows, corrected_by: str, tmp_path: Path
 ) -> None:
-    """A state alone, or from a Dict; the actions fit the env."""
+    """The state may be the whole observation, or a part of a Dict."""
     env = CorridorEnv(shows)
     pilot = pilot_of(env, clone(tmp_path / "policy.safetensors"), corrected_by, 0)
     pilot.begin()

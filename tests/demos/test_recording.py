@@ -82,7 +82,7 @@ def test_observations_are_paired_with_actions(shows: Shows, tmp_path: Path) -> N
 
 
 def test_the_intended_action_is_recorded(tmp_path: Path) -> None:
-    """An expert may carry out another one, and a person may intervene."""
+    """An expert may execute another action, and a person may intervene."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path, driver="policy") as env:
         env.reset()
@@ -160,8 +160,8 @@ def small_files(size: int) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("size", [100, 4_000])
-def test_a_step_that_cannot_be_written_brings_the_env_to_rest(size: int, tmp_path: Path) -> None:
-    """On a full disk, or if time runs backwards."""
+def test_a_step_that_cannot_be_written_stops_the_env(size: int, tmp_path: Path) -> None:
+    """A step cannot be written on a full disk, or if time runs backwards."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path) as env:
         env.reset()
@@ -199,7 +199,7 @@ def test_a_full_episode_goes_on_in_the_next(
     assert [e.outcome for e in episodes] == ["continued"] * (len(episodes) - 1) + ["collision"]
 
 
-def test_nothing_moves_where_nothing_can_be_recorded(tmp_path: Path) -> None:
+def test_an_env_does_not_move_if_its_recording_is_in_use(tmp_path: Path) -> None:
     inner = CorridorEnv("state")
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0):
         env = RecordEpisodes(inner, tmp_path)

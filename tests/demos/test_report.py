@@ -26,8 +26,7 @@ from shapechanger.demos.report import distributions, recording_html
 from tests.demos.episodes.making import ACTIONS, header, recorded, step
 
 
-def test_the_numbers_of_a_recording(tmp_path: Path) -> None:
-    """Of the kept steps, over all episodes."""
+def test_the_numbers_of_a_recording_are_of_kept_steps(tmp_path: Path) -> None:
     speeds = [-1.0, -0.01, 0.0, 0.01, 0.02, 1.0, 1.0, 7.0]
     with EpisodeWriter.create(tmp_path, header(env="x/Car-v1"), spare_bytes=0) as writer:
         for number, speed in enumerate(speeds):
@@ -55,7 +54,7 @@ def test_the_numbers_of_a_recording(tmp_path: Path) -> None:
     assert (distance.values.tolist(), distance.missing) == ([2.0, 4.0, 2.0], 4)
     assert (between.feature.unit, between.values.mean()) == ("ms", 50.0)
     edit(writer.path, Drop(2, 3, "bad"))
-    assert read_episode(writer.path).gaps_s == pytest.approx([0.05] * 3)  # Not over the dropped.
+    assert read_episode(writer.path).gaps_s == pytest.approx([0.05] * 3)  # The gap is left out.
     page = recording_html("name", [episode])
     for part in ("Car-v1", "7 of 8", "Collisions", "step 5: here", "4 without a value"):
         assert part in page

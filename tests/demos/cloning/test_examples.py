@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -122,17 +124,21 @@ def test_balance_of_both_sides() -> None:
     assert mirror_of(STEERS).balance(np.array([[-0.5, 1.0], [1.0, 1.0]], np.float32)) == 0.5
 
 
-def test_split_by_time() -> None:
-    """The last steps over all episodes are the test set."""
-    assert np.flatnonzero(evaluated_steps([6, 4], "time", 0.3)).tolist() == [7, 8, 9]
-    assert not evaluated_steps([6, 4], "time", 0.0).any()
-
-
-def test_split_by_episode() -> None:
-    """The test set is whole episodes: at least the share, at least one, and never all."""
-    assert np.flatnonzero(evaluated_steps([6, 3, 1], "episode", 0.2)).tolist() == [6, 7, 8, 9]
-    assert np.flatnonzero(evaluated_steps([6, 4], "episode", 0.01)).tolist() == [6, 7, 8, 9]
-    assert evaluated_steps([6, 4], "episode", 0.99).sum() == 4
+@pytest.mark.parametrize(
+    ("episodes", "by", "share", "held_out"),
+    [
+        ([6, 4], "time", 0.3, 3),
+        ([6, 4], "time", 0.0, 0),
+        ([6, 3, 1], "episode", 0.2, 4),  # Whole episodes, with at least the share.
+        ([6, 4], "episode", 0.01, 4),  # At least one.
+        ([6, 4], "episode", 0.99, 4),  # Never all.
+    ],
+)
+def test_the_last_steps_are_held_out(
+    episodes: list[int], by: Any, share: float, held_out: int
+) -> None:
+    expected = [False] * (10 - held_out) + [True] * held_out
+    assert evaluated_steps(episodes, by, share).tolist() == expected
 
 
 def test_invalid_splits_are_refused() -> None:

@@ -195,7 +195,7 @@ def test_contradictions_that_change_no_step_are_reported(
 def test_no_damage_shifts_the_pictures(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
-    """After any damage to a video's tables, no step has a wrong image without a warning."""
+    """No step gets a wrong image without a warning, whatever bytes of the tables are damaged."""
     options = ["-g", "4", "-bf", "2", "-movflags", "+faststart"]
     folder = write_set(tmp_path_factory.mktemp("damaged") / "set", options=options)
     content = bytearray((folder / VIDEO).read_bytes())
@@ -281,7 +281,7 @@ def test_one_damaged_file_of_several(tmp_path: Path) -> None:
     assert "file-001.mp4 is damaged" in findings_of(context)
 
 
-def test_rows_are_found_in_a_file_that_is_not_named(tmp_path: Path) -> None:
+def test_rows_are_found_in_other_files_than_stated(tmp_path: Path) -> None:
     """LeRobot's converter to version 3 wrote wrong numbers of files to `meta/episodes`."""
     folder = write_set(tmp_path / "set", places=place(1, **{"data/file_index": 7}))
     table = pq.read_table(folder / DATA)

@@ -51,14 +51,14 @@ def test_images_of_8_bits_become_jpegs(kind: str, mode: str) -> None:
         (bytes(99), "an empty image"),
     ],
 )
-def test_other_images_are_named(image: bytes, reason: str) -> None:
+def test_other_images_are_refused(image: bytes, reason: str) -> None:
     with pytest.raises(DemosError, match=reason):
         load_jpeg(image)
 
 
 @settings(max_examples=25, deadline=None)
 @given(shown=st.lists(st.tuples(st.sampled_from([*GOOD, *BAD]), st.booleans(), st.booleans())))
-def test_each_record_is_a_step_with_its_picture_or_left_out(
+def test_each_record_becomes_a_step_with_its_image_or_is_left_out(
     shown: list[tuple[Any, bool, bool]],
 ) -> None:
     context = ImportContext()
@@ -89,10 +89,9 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
         max_size=12,
     )
 )
-def test_drives_are_whole_records_in_order_of_one_size_and_without_jumps(
+def test_drives_have_intact_records_in_order_of_one_size_without_pauses(
     made: list[tuple[int | None, Any]],
 ) -> None:
-    """Records that are left out count as missing for rates and pauses."""
     records = [
         ExchangeRecord(
             name=f"record {n}",

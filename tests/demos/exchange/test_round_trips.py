@@ -124,7 +124,7 @@ def test_any_recording_round_trips(
 def test_many_episodes_keep_their_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """Episodes keep their order with relative folders, and if one is read in several chunks."""
+    """Folders are relative, and one episode is read in several chunks."""
     monkeypatch.chdir(tmp_path)
     for count in (3, 1, 300):
         drive(Path("data"), count)

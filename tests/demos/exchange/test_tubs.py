@@ -340,7 +340,7 @@ def test_depth_and_lists_are_named(tmp_path: Path) -> None:
 
 
 def test_unknown_times_and_starts(tmp_path: Path) -> None:
-    """If a record lacks its time, the drive has no times and no start time."""
+    """A drive with a record without a time has neither times nor a start time."""
     made = records(4, **NO_IMAGE)
     made[2]["_timestamp_ms"] = None
     _, done = imported(tub_folder(tmp_path / "tub", made))
