@@ -183,8 +183,8 @@ class RobotKey:
         segno.make(f"{console}#key={robot.key}", micro=False).terminal(sys.stdout, compact=True)
 
 
-def shown_credentials(credentials: Credentials) -> str:
-    """Format the key and the fingerprint for people to compare."""
+def shown_credentials(name: str, credentials: Credentials) -> str:
+    """Return the key and the fingerprint for people to compare, and how to use them elsewhere."""
     fingerprint = credentials.fingerprint
     return (
         f"key          {credentials.key}\n"
