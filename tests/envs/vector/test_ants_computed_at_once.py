@@ -155,8 +155,9 @@ def test_overridden_steps_are_called() -> None:
     plain.step = lambda action: (np.zeros(105), 7.0, False, False, {})  # type: ignore[method-assign]
     envs = ThreadVectorEnv([Generous, AntEnv, lambda: plain])
     envs.reset(seed=0)
-    _, rewards, *_ = envs.step(np.zeros((3, 8), np.float32))
+    _, rewards, _, truncated, _ = envs.step(np.zeros((3, 8), np.float32))
     assert rewards[0] > 900.0 > rewards[1] != rewards[2] == 7.0
+    assert not truncated.any()  # These envs have no time limit.
     envs.close()
 
 

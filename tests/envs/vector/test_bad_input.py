@@ -154,6 +154,16 @@ def test_actions_are_ignored_at_an_autoreset() -> None:
     envs.close()
 
 
+@pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
+def test_actions_are_never_ignored_without_an_autoreset_in_the_next_step(mode: str) -> None:
+    envs = shapechanger.make_vec("InvertedPendulum", 2, autoreset_mode=mode, max_episode_steps=1)
+    envs.reset(seed=0)
+    envs.step(np.zeros((2, 1), np.float32))
+    with pytest.raises(BadAction, match="env 0"):
+        envs.step(np.full((2, 1), np.nan, np.float32))
+    envs.close()
+
+
 @pytest.mark.parametrize(
     ("mask", "error", "sentence"),
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +29,16 @@ def _break(env: Any) -> None:
 
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", ["Ant", "Hopper", "InvertedPendulum"])
+@pytest.mark.parametrize("name", ["Ant", "Hopper", "Hopper-v5", "InvertedPendulum"])
 def test_other_envs_are_unaffected(name: str, mode: str, threads: int) -> None:
     """When one env diverges, the results of the others do not change."""
     whole, broken = (
-        shapechanger.make_vec(name, 3, threads=threads, autoreset_mode=mode) for _ in range(2)
+        ThreadVectorEnv(
+            [partial(gym.make, name if "-" in name else f"shapechanger/{name}-v1")] * 3,
+            threads=threads,
+            autoreset_mode=AutoresetMode(mode),
+        )
+        for _ in range(2)
     )
     for envs in (whole, broken):
         envs.reset(seed=0)
@@ -57,13 +63,14 @@ def test_other_envs_are_unaffected(name: str, mode: str, threads: int) -> None:
 
 
 class _Uncertain(gym.Env[Any, Any]):
-    """Env with a non-finite observation in its second step, without a report."""
+    """Env with a non-finite observation in its second step, which it may report as divergence."""
 
     observation_space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
 
-    def __init__(self, terminates: bool) -> None:
-        self.terminates = terminates
+    def __init__(self, ends: tuple[bool, bool], reports: bool) -> None:
+        self.ends = ends
+        self.reports = reports
 
     def reset(self, *, seed: Any = None, options: Any = None) -> Any:
         """Start an episode."""
@@ -73,21 +80,26 @@ class _Uncertain(gym.Env[Any, Any]):
     def step(self, action: Any) -> Any:
         """Return NaN in the second step."""
         self.steps += 1
-        bad = self.steps == 2
-        return np.array([1.0, np.nan if bad else 1.0]), 1.0, bad and self.terminates, False, {}
+        if self.steps != 2:
+            return np.ones(2), 1.0, False, False, {}
+        return np.array([1.0, np.nan]), 1.0, *self.ends, {"diverged": True} if self.reports else {}
 
 
-@pytest.mark.parametrize("terminates", [True, False])
+@pytest.mark.parametrize("reports", [True, False])
+@pytest.mark.parametrize("ends", [(False, False), (True, False), (False, True)])
 @pytest.mark.parametrize("mode", MODES)
-def test_an_observation_that_is_not_finite_ends_the_episode(mode: str, terminates: bool) -> None:
+def test_an_observation_that_is_not_finite_ends_the_episode(
+    mode: str, ends: tuple[bool, bool], reports: bool
+) -> None:
     """The non-finite number is replaced by 0 in the last observation."""
     envs = ThreadVectorEnv(
-        [lambda: _Uncertain(terminates)] * 2, threads=2, autoreset_mode=AutoresetMode(mode)
+        [lambda: _Uncertain(ends, reports)] * 2, threads=2, autoreset_mode=AutoresetMode(mode)
     )
     envs.reset()
     envs.step(np.zeros((2, 1)))
-    observations, rewards, terminated, _, infos = envs.step(np.zeros((2, 1)))
+    observations, rewards, terminated, truncated, infos = envs.step(np.zeros((2, 1)))
     assert terminated.all()
+    assert truncated.tolist() == [ends[1]] * 2
     assert rewards.tolist() == [0.0, 0.0]
     if mode == "SameStep":
         assert infos["final_info"]["diverged"].all()

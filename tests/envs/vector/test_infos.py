@@ -71,6 +71,12 @@ def test_columns_are_batched_alike(kinds: list[int], order: Any) -> None:
     require_same(batched(_many(len(infos)), parts), _gymnasiums(infos))
 
 
+def test_infos_with_the_same_keys_are_grouped() -> None:
+    first, second = in_columns({0: {"a": 1}, 1: {"b": 2}, 2: {"a": 3}})
+    assert (first.numbers, second.numbers) == ([0, 2], [1])
+    assert first.values == {"a": [1, 3]}
+
+
 def test_columns_are_split_by_env() -> None:
     """A single result replaces the columns' info of its env."""
     results = StepResults(2)

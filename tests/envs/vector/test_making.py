@@ -87,6 +87,8 @@ def test_each_env_may_have_a_body_of_its_own() -> None:
         for given, expected in (("fair", ("fair",) * 4), (list("abcd"), tuple("abcd"))):
             envs.set_attr("mood", given)
             assert envs.get_attr("mood") == expected
+        envs.set_attr("describe", lambda *args, **kwargs: (args, kwargs))
+        assert envs.call("describe", 1, speed=2) == (((1,), {"speed": 2}),) * 4
         envs.close()
 
 

@@ -125,12 +125,62 @@ def test_all_calls_run_in_the_thread_of_the_env() -> None:
     assert len({*homes}) == 2
 
 
+def test_envs_whose_physics_steps_separately_are_called_in_the_callers_thread() -> None:
+    envs = shapechanger.make_vec("InvertedPendulum", 3, threads=2)
+    envs.reset(seed=0)
+    envs.set_attr("thread", threading.get_ident)
+    assert set(envs.call("thread")) == {threading.get_ident()}
+    envs.close()
+
+
+def test_only_resets_that_change_bodies_take_turns() -> None:
+    meeting, working = threading.Barrier(2, timeout=5.0), threading.Lock()
+
+    class Timed(_Plain):
+        def reset(self, *, seed: Any = None, options: Any = None) -> Any:
+            if "body" not in options:
+                meeting.wait()
+            else:
+                assert working.acquire(blocking=False)
+                threading.Event().wait(0.1)
+                working.release()
+            return np.zeros(1), {}
+
+    envs = ThreadVectorEnv([Timed, Timed], threads=2)
+    envs.reset(options={"speed": 1.0})
+    envs.reset(options={"body": "another"})
+    envs.close()
+
+
+def test_one_thread_draws_all_windows() -> None:
+    class Shown(_Plain):
+        render_mode = "human"
+
+    envs = ThreadVectorEnv([Shown, Shown], threads=2)
+    assert (envs.render_mode, envs.threads) == ("human", 1)
+    envs.close()
+
+
+def test_threads_that_have_ended_are_replaced() -> None:
+    pool, done = EnvThreads(2, 2), []
+    pool.do(done.append, range(2))
+    (worker,) = _ours()
+    pool._workers[0].inbox.put(None)
+    worker.join()
+    pool.do(done.append, range(2))
+    assert sorted(done) == [0, 0, 1, 1]
+    pool.stop()
+
+
 @pytest.mark.parametrize(("asked", "started"), [(1, 0), (2, 1), (3, 2), (9, 2)])
 def test_the_number_of_threads_is_as_requested(asked: int, started: int) -> None:
-    """The caller's thread counts, and there are at most as many threads as envs."""
+    """The caller's thread counts, and there are at most as many threads as envs.
+
+    Daemon threads do not keep a program from its exit.
+    """
     envs = shapechanger.make_vec("InvertedPendulum", 3, threads=asked)
     envs.reset(seed=0)
-    assert len(_ours()) == started
+    assert [thread.daemon for thread in _ours()] == [True] * started
     envs.close()
     assert _ours() == []
 

@@ -152,8 +152,7 @@ class SubEnv:
         """Start an episode, and return its info; see `gymnasium.Env.reset`."""
         self.row[...], info = self.env.reset(seed=seed, options=options)
         inner: Any = self.env.unwrapped
-        # Shapechanger's envs report divergence. A reset may have replaced the data.
-        if hasattr(inner, "data") and not hasattr(inner, "diverged"):
+        if hasattr(inner, "data"):  # A reset may have replaced it.
             self._warnings = inner.data.warning.number[_BAD_STATE]
         return info
 

@@ -127,7 +127,7 @@ class EnvThreads:
     def _awake(self) -> list[_Worker]:
         """Return the threads, and start them if they are not alive."""
         if not all(worker.is_alive() for worker in self._workers):
-            self._workers = []  # pragma: no cover  # After a fork; tested in a subprocess.
+            self._workers = []  # After a fork.
         while len(self._workers) < len(self._parts) - 1:
             self._workers.append(_Worker())
         return self._workers
