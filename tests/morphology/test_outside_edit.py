@@ -122,3 +122,20 @@ def test_a_name_belongs_to_one_edit(module: Any, tmp_path: Path) -> None:
             kind(name, (Edit,), parts | {"__qualname__": f"elsewhere.{name}"}, frozen=True)
     with pytest.raises(MorphologyError, match="There is an edit 'cut' already"):
         kind("Cut", (Edit,), parts | {"__qualname__": "Cut"}, frozen=True)
+    names = {"__module__": "copied", "__qualname__": "Soften"}
+    copied = kind("Soften", (Edit,), parts | names, frozen=True)
+    assert EDITS["soften"] is copied
+
+
+def test_base_classes_are_no_edits() -> None:
+    before = dict(EDITS)
+
+    class TwoWords(Edit, frozen=True):
+        pass
+
+    class _Private(TwoWords, frozen=True):
+        def apply(self, spec: object) -> None:
+            del spec
+
+    assert before == EDITS
+    assert (TwoWords.__struct_config__.tag, _Private().partly(0.5).amount) == ("two_words", 0.5)

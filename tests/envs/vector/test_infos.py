@@ -75,6 +75,8 @@ def test_infos_with_the_same_keys_are_grouped() -> None:
     first, second = in_columns({0: {"a": 1}, 1: {"b": 2}, 2: {"a": 3}})
     assert (first.numbers, second.numbers) == ([0, 2], [1])
     assert first.values == {"a": [1, 3]}
+    tuples = [{"a": (1, 2)}] * 3
+    require_same(_ours(tuples), _gymnasiums(tuples))
 
 
 def test_columns_are_split_by_env() -> None:

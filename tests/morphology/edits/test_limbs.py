@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology import AddLimb, AddSegment, Cut, Edit, Remove, Split
+from shapechanger.morphology import (
+    AddLimb,
+    AddSegment,
+    Cut,
+    Edit,
+    PlaceGeom,
+    Radius,
+    Remove,
+    Split,
+    Stretch,
+    reshape,
+)
 from tests.morphology.models import arm, built, capsule_mass, leg, limb, mass, posed, spec_of
 from tests.morphology.scenes import asset_spec
 
@@ -37,8 +48,21 @@ def test_a_cut_leaves_something() -> None:
 
 def test_a_partial_cut_shrinks_elements_beyond_it() -> None:
     """Geoms beyond the cut become small, and points at the end move a part of the way inwards."""
-    spec = arm(lower='<geom name="far" size=".01" pos=".35 0 0"/><site name="end" pos=".4 0 0"/>')
-    half = built(spec, Cut("lower", 0.5).partly(0.5))
+    spec = arm(
+        joint='pos=".1 0 0"',
+        lower='<geom name="far" size=".01" pos=".35 0 0"/><site name="end" pos=".4 0 0"/>'
+        '<geom name="near" type="capsule" size=".01" fromto=".03 .01 .02 .17 .05 .04"/>',
+    )
+    before, half = built(spec), built(spec, Cut("lower", 0.5).partly(0.5))
+    whole = built(spec, Cut("lower", 0.5))
+    assert half.nsite == before.nsite == whole.nsite + 1  # The hand lies between cut and end.
+    assert half.ngeom == before.ngeom == whole.ngeom + 1
+    for field in ("pos", "quat", "size"):
+        near = getattr(before.geom("near"), field)
+        np.testing.assert_array_equal(getattr(whole.geom("near"), field), near)
+    # A child moves towards the joint, which lies 0.1 m from the origin.
+    child = built(spec, Cut("upper", 0.5).partly(0.5)).body("lower")
+    np.testing.assert_allclose(child.pos, [0.325, 0.0, 0.0])
     assert half.geom("far").size[0] == pytest.approx(0.005)
     np.testing.assert_allclose(half.geom("far").pos, [0.35, 0.0, 0.0])
     np.testing.assert_allclose(half.site("end").pos, [0.3, 0.0, 0.0])
@@ -51,11 +75,16 @@ def test_a_glob_removes_parents_and_children_once() -> None:
 
 def test_a_split_gives_two_segments() -> None:
     """Both parts together cover the segment, and the new hinge is like the segment's own."""
-    after = built(leg(), Split("thigh", "shank", at=1.0 / 3.0, gear=5.0))
+    spec = leg()
+    spec.body("thigh").gravcomp = 0.5
+    after = built(spec, Split("thigh", "shank", at=1.0 / 3.0, gear=5.0))
     assert _bodies(after) == ["trunk", "thigh", "shank", "shin"]
     np.testing.assert_allclose(after.body("shank").pos, [0.0, 0.0, -0.1])
     np.testing.assert_allclose(after.geom("thigh").size, [0.03, 0.05, 0.0])
     np.testing.assert_allclose(after.geom("thigh_of_shank").size, [0.03, 0.1, 0.0])
+    for body, length in (("thigh", 0.1), ("shank", 0.2)):
+        assert mass(after, body) == pytest.approx(capsule_mass(0.03, length, 500.0))
+        assert after.body_gravcomp[after.body(body).id] == 0.5
     hinge, own = after.joint("shank"), after.joint("hip")
     for field in ("axis", "armature", "damping", "stiffness", "frictionloss"):
         np.testing.assert_array_equal(getattr(hinge, field), getattr(own, field))
@@ -175,8 +204,11 @@ def test_a_body_without_hinge_needs_an_axis() -> None:
     ],
 )
 def test_axis_range_and_the_lack_of_a_motor_can_be_given(edit: Edit) -> None:
-    model = built(leg(), edit)
+    spec = leg()
+    spec.default.joint.type = mujoco.mjtJoint.mjJNT_SLIDE
+    model = built(spec, edit)
     assert model.nu == 2
+    assert model.joint("foot").type == mujoco.mjtJoint.mjJNT_HINGE
     np.testing.assert_allclose(model.joint("foot").range, [-0.2, 0.7])
     np.testing.assert_array_equal(model.joint("foot").axis, [0.0, 1.0, 0.0])
     if isinstance(edit, AddSegment):
@@ -195,6 +227,7 @@ def test_a_partial_limb_is_small_and_weak(
 ) -> None:
     """Size, gear and armature scale with the amount, from 0.01, and masses with its cube."""
     full, (gear, size) = built(leg(), edit), like
+    assert reshape(leg(), [edit]).compiler.boundmass == 0.0
     for amount, part in ((1e-9, 0.01), (0.25, 0.25)):
         model = built(leg(), edit.partly(amount))
         share = part if size == 1.0 else model.geom(geom).size[0] / full.geom(geom).size[0]
@@ -206,3 +239,29 @@ def test_a_partial_limb_is_small_and_weak(
         assert model.body_mass[body] == pytest.approx(share**3 * full.body_mass[body])
     if size != 1.0:
         assert full.body("thigh_2").mass == pytest.approx(size**3 * full.body("thigh").mass)
+
+
+@pytest.mark.parametrize(
+    ("edit", "skins"),
+    [
+        *((Cut("other", 0.5), 0), (Split("other", "far"), 0), (PlaceGeom("other", radius=0.02), 0)),
+        *((Remove("other").partly(0.5), 0), (Stretch("other", 2.0), 0), (Radius("other", 1.0), 1)),
+    ],
+)
+def test_a_skin_over_a_changed_body_is_removed(edit: Edit, skins: int) -> None:
+    bone = 'bindpos="0 0 0" bindquat="1 0 0 0" vertid="0 1 2" vertweight="1 1 1"'
+    spec = arm(
+        '<deformable><skin name="cover" vertex="0 0 0 1 0 0 0 1 0" face="0 1 2">'
+        f'<bone body="other" {bone}/></skin></deformable>'
+    )
+    assert built(spec).nskin == 1
+    assert built(spec, edit).nskin == skins
+
+
+def test_a_copied_limb_has_the_pose_of_the_original_in_keyframes() -> None:
+    spec = leg()
+    spec.add_key(name="bent", qpos=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.3, -0.7], ctrl=[0.1, 0.2])
+    model = built(spec, AddLimb("thigh", "_2", 2.0))
+    key = model.key("bent")
+    np.testing.assert_array_equal(key.qpos[7:], [0.3, -0.7] * 2)
+    np.testing.assert_array_equal(key.ctrl, [0.1, 0.2] * 2)

@@ -24,6 +24,7 @@ from shapechanger.morphology import (
     PlaceGeom,
     StartHeight,
     Stiffness,
+    Stretch,
     TotalMass,
     compile_body,
     reshape,
@@ -77,6 +78,9 @@ def test_a_gear_keeps_its_direction() -> None:
         (Gear("jet", to=-2.0), [0.5, 0.0, -2.0, 0.0, 1.0, 0.0]),
     ):
         np.testing.assert_allclose(built(spec_of(_MOTORS), edit).actuator("jet").gear, gear)
+    spec = leg()
+    spec.actuator("hip").gear = [49.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    assert built(spec, Gear("hip", to=1.0)).actuator("hip").gear[0] == 1.0  # Without rounding.
     with pytest.raises(MorphologyError, match="'idle' is not a motor, or its gear is zero"):
         built(spec_of(_MOTORS), Gear("*", scale=2.0))
 
@@ -113,8 +117,9 @@ def test_friction_has_three_coefficients(component: Any, place: int) -> None:
         *('<damper name="a" joint="lower" kv="3" ctrlrange="0 1"/>',),
         *('<cylinder name="a" joint="lower" area="3" bias="1 2 3" timeconst=".1"/>',),
         *('<muscle name="a" joint="lower" lengthrange="-1 1" force="3"/>',),
+        *('<muscle name="a" joint="lower" lengthrange="-1 1" force=".5"/>',),
         *('<muscle name="a" joint="lower" lengthrange="-1 1" scale="3"/>',),
-        *('<general name="a" joint="lower" gainprm="3" biastype="affine" biasprm="1 2 3"/>',),
+        *('<general name="a" joint="lower" gainprm="3 0 0 5" biastype="affine" biasprm="1 2 3"/>',),
     ],
 )
 def test_gear_scales_the_force_of_any_actuator(actuator: str) -> None:
@@ -132,6 +137,11 @@ def test_gear_scales_the_force_of_any_actuator(actuator: str) -> None:
             forces.append(data.qfrc_actuator.copy())
         np.testing.assert_allclose(forces[1], 0.4 * forces[0], rtol=1e-9, atol=1e-12)
         assert np.any(forces[0])
+    np.testing.assert_allclose(new.actuator_forcerange, 0.4 * old.actuator_forcerange)
+    first = 4 if "muscle" in actuator else 3  # The numbers from there on are no strengths.
+    for field in ("actuator_gainprm", "actuator_biasprm"):
+        kept = [getattr(model, field)[:, first:] for model in (old, new)]
+        np.testing.assert_array_equal(*kept)
 
 
 def test_a_largest_force_scales_with_all_of_its_motors() -> None:
@@ -139,12 +149,16 @@ def test_a_largest_force_scales_with_all_of_its_motors() -> None:
 
     If the limit stayed, a stronger motor would have no effect.
     """
-    motors = '<actuator><motor name="a" joint="upper"/><motor name="b" joint="upper"/></actuator>'
-    spec = arm(motors, joint='actuatorfrcrange="-2 2"')
-    for pattern, largest in (("*", 6.0), ("a", 2.0)):
+    motors = '<motor name="a" joint="upper"/><motor name="b" joint="upper"/>'
+    motors += '<motor name="c" joint="lower"/>'
+    more = f'<actuator>{motors}</actuator><sensor><jointpos joint="upper"/></sensor>'
+    spec = arm(more, joint='actuatorfrcrange="-2 2"')
+    spec.joint("lower").actfrcrange = [-1.0, 1.0]
+    for pattern, upper, lower in (("*", 6.0, 3.0), ("a", 2.0, 1.0)):
         model = built(spec, Gear(pattern, scale=3.0))
-        limits = model.jnt_actfrcrange[model.joint("upper").id]
-        np.testing.assert_array_equal(limits, [-largest, largest])
+        for joint, largest in (("upper", upper), ("lower", lower)):
+            limits = model.jnt_actfrcrange[model.joint(joint).id]
+            np.testing.assert_array_equal(limits, [-largest, largest])
 
 
 def _range(model: mujoco.MjModel, joint: str) -> list[float]:
@@ -177,18 +191,39 @@ def test_a_slide_without_limits_is_locked_at_a_position() -> None:
     assert built(gantry(), Lock("y", 0.3)).njnt == 4
     half = built(gantry(), Lock("y", 0.3).partly(0.5))
     assert _range(half, "y") == pytest.approx([0.3 - 1.0, 0.3 + 1.0])
+    nearly = _range(built(leg(), Lock("knee").partly(1.0 - 1e-9)), "knee")
+    middle = math.radians(-45.0)
+    assert nearly == pytest.approx([middle - 5e-4, middle + 5e-4])
 
 
 def test_motors_are_as_strong_as_the_model_allows() -> None:
     """The default gear is the effort limit of a URDF; a joint without one needs a gear."""
     model = built(spec_of(URDF), AddMotor("shoulder"), AddMotor("elbow", 3.0))
     assert [model.actuator(i).name for i in range(model.nu)] == ["shoulder", "elbow"]
-    np.testing.assert_array_equal(model.actuator_gear[:, 0], [7.0, 3.0])
+    np.testing.assert_array_equal(model.actuator_gear, [[7.0, *[0.0] * 5], [3.0, *[0.0] * 5]])
     np.testing.assert_array_equal(model.actuator_ctrlrange, [[-1.0, 1.0]] * 2)
     with pytest.raises(MorphologyError, match="no largest torque or force of 'elbow': give a gear"):
         reshape(spec_of(URDF), [AddMotor("*")])
     half = built(spec_of(URDF), AddMotor("shoulder", amount=0.5))
     assert half.actuator_gear[0, 0] == 3.5
+    manual = limb('<geom size=".1"/>', 'autolimits="false"')
+    assert built(manual, AddMotor("link", 2.0)).actuator_ctrllimited[0]
+
+
+@pytest.mark.parametrize(
+    ("coupling", "joint", "motors"),
+    [
+        ('joint1="lower" joint2="upper"', "*", ["upper", "other"]),
+        ('joint1="lower" joint2="upper"', "lower", ["lower"]),
+        ('joint1="lower" joint2="upper" active="false"', "*", ["upper", "lower", "other"]),
+        ('joint1="lower"', "*", ["upper", "lower", "other"]),
+    ],
+)
+def test_a_joint_that_follows_another_gets_a_motor_only_by_its_name(
+    coupling: str, joint: str, motors: list[str]
+) -> None:
+    model = built(arm(f"<equality><joint {coupling}/></equality>"), AddMotor(joint, 1.0))
+    assert [model.actuator(i).name for i in range(model.nu)] == motors
 
 
 def test_a_motor_of_a_tendon_is_not_a_motor_of_the_joint_of_the_same_name() -> None:
@@ -213,12 +248,49 @@ def test_a_fixed_robot_is_set_free() -> None:
     assert free.body("base").mass == 4.0
 
 
+def test_no_body_of_a_freed_robot_is_merged_with_another() -> None:
+    spec = spec_of(
+        """<mujoco><compiler fusestatic="true"/><worldbody><body name="base"><geom size=".1"/>
+        <body name="tool"><geom size=".1"/></body></body></worldbody></mujoco>"""
+    )
+    assert built(spec, AddFreeJoint("base")).body("tool").mass > 0.0
+
+
 def test_a_body_moves_with_what_it_carries() -> None:
     before, after = built(leg()), built(leg(), PlaceBody("thigh", (0.0, 0.5, 0.1)))
     np.testing.assert_array_equal(after.body("thigh").pos, [0.0, 0.5, 0.1])
     for field in ("geom_pos", "jnt_pos", "site_pos", "body_mass", "body_inertia", "body_ipos"):
         np.testing.assert_array_equal(getattr(after, field), getattr(before, field))
     np.testing.assert_allclose(tip(after, "toe") - tip(before, "toe"), [0.0, 0.3, 0.1])
+    spec = leg()
+    spec.add_key(name="home", qpos=[0.0, 0.0, 2.0, 0.8, 0.6, 0.0, 0.0, 0.1, -0.2])
+    half = built(spec, PlaceBody("trunk", (1, 2, 3)).partly(0.5))  # Whole numbers will do.
+    np.testing.assert_allclose(half.body("trunk").pos, [0.5, 1.0, 2.0])
+    np.testing.assert_allclose(half.key_qpos[0], [0.5, 1.0, 2.5, 0.8, 0.6, 0.0, 0.0, 0.1, -0.2])
+
+
+@pytest.mark.parametrize(
+    ("joint", "position"),
+    [
+        ('type="slide" axis="0 0 2" ref=".5"', 0.5),
+        ('type="slide" axis="0 1 1"', 0.2),
+        ('type="hinge" axis="0 0 1"', 0.2),
+    ],
+)
+def test_a_start_height_changes_keyframes_of_vertical_slides_only(
+    joint: str, position: float
+) -> None:
+    spec = spec_of(
+        f"""<mujoco><worldbody><body name="trunk"><joint {joint}/><geom size=".1"/></body>
+        </worldbody><keyframe><key qpos=".2"/></keyframe></mujoco>"""
+    )
+    assert built(spec, StartHeight("trunk", 0.7)).key_qpos[0, 0] == position
+
+
+def test_a_stretch_along_an_axis_moves_elements_along_it_only() -> None:
+    spec = arm(lower='<site name="off" pos=".1 .2 .3"/>')
+    model = built(spec, Stretch("lower", 2.0, axis="x"))
+    np.testing.assert_allclose(model.site("off").pos, [0.2, 0.2, 0.3])
 
 
 def test_a_geom_is_placed_by_its_ends() -> None:
@@ -280,3 +352,12 @@ def test_a_robot_lands_on_its_floor() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, nstep=500)
     assert data.qpos[2] == pytest.approx(0.6, abs=0.01)
+
+
+def test_a_floor_does_not_depend_on_the_defaults_of_the_model() -> None:
+    spec = spec_of('<mujoco><default><geom contype="0" conaffinity="0"/></default></mujoco>')
+    floor = built(spec, AddFloor(friction=0.5, height=0.5)).geom("floor")
+    np.testing.assert_array_equal(floor.pos, [0.0, 0.0, 0.5])
+    np.testing.assert_array_equal(floor.size, [0.0, 0.0, 0.05])
+    np.testing.assert_array_equal(floor.friction, [0.5, 0.005, 0.0001])
+    assert (floor.contype[0], floor.conaffinity[0]) == (1, 1)

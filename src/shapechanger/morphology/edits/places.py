@@ -129,19 +129,19 @@ class PlaceGeom(Edit, frozen=True):
                 references.release_drawings(spec, {references.key_of(geom.parent)})
             with geometry.same_density(geom):
                 if self.start is not None:
-                    old, new = geometry.axis_ends(geom), np.array([self.start, self.end], float)
+                    old, new = geometry.axis_ends(geom), np.array([self.start, self.end])
                     if not len(old):
                         raise MorphologyError(
                             f"{geom.name!r} is not a capsule or cylinder, so it has no ends."
                         )
                     # The ends of a geom defined by its pose have no order: match the nearest.
-                    here, turned = (np.linalg.norm(old - n, axis=1).sum() for n in (new, new[::-1]))
+                    here, turned = (np.linalg.norm(old - ends) for ends in (new, new[::-1]))
                     if not geometry.has_ends(geom) and here > turned:
                         old = old[::-1]
                     geom.size = [geom.size[0], 0.0, 0.0]
                     geometry.set_ends(geom, part_of_the_way(old, new, self.amount))
                 if self.middle is not None:
-                    place, to = geometry.middle_of(geom), np.array(self.middle, float)
+                    place, to = geometry.middle_of(geom), np.array(self.middle)
                     geometry.move_by(geom, part_of_the_way(place, to, self.amount) - place)
                 if self.radius is not None:
                     if geom.type not in _ROUND:
@@ -175,7 +175,7 @@ class PlaceBody(Edit, frozen=True):
                 keyframes.change(joint.name, self._placed)
 
     def _placed(self, pose: np.ndarray) -> np.ndarray:
-        place = part_of_the_way(pose[:3], np.array(self.to, float), self.amount)
+        place = part_of_the_way(pose[:3], np.array(self.to), self.amount)
         return np.concatenate([place, pose[3:]])
 
 

@@ -310,4 +310,4 @@ class Gravity(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Set the model's gravity."""
         old = np.array(spec.option.gravity)
-        spec.option.gravity = part_of_the_way(old, np.array(self.to, float), self.amount)
+        spec.option.gravity = part_of_the_way(old, np.array(self.to), self.amount)
