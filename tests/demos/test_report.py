@@ -20,7 +20,6 @@ from shapechanger.demos.episodes import (
     edit,
     read_episode,
 )
-from shapechanger.demos.episodes.records import is_same_rate, rate_jitter
 from shapechanger.demos.jpeg import COLOURS, overlay
 from shapechanger.demos.report import distributions, recording_html
 from tests.demos.episodes.making import ACTIONS, header, recorded, step
@@ -91,16 +90,6 @@ def test_durations_are_those_of_the_times(
     assert found.seconds == pytest.approx(driven_s, rel=1e-6)
     assert episode_with([None] * 8, hz).durations_s == (1 / hz,) * 8
     assert episode_with([], hz).durations_s == ()
-
-
-def test_jitter_is_measured_and_bounded() -> None:
-    assert rate_jitter([0.05] * 100, 20.0) == pytest.approx(0.0)
-    assert rate_jitter([0.051] * 97 + [5.0] * 3, 20.0) == pytest.approx(0.02)
-    assert rate_jitter([0.05, 0.2] * 50, 20.0) == 0.25
-    assert rate_jitter([0.2] * 3, 20.0) == 0.0
-    assert is_same_rate(19.61, 20.0, 0.02)
-    assert not is_same_rate(19.61, 20.0)
-    assert not is_same_rate(10.0, 20.0, 9.9)
 
 
 @pytest.mark.parametrize("steering", [-1.0, 0.5])

@@ -1,8 +1,10 @@
 """Repairs: a crash costs at most the step being written. Merges copy only whole episodes."""
 
+import errno
 import json
 import os
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -12,14 +14,16 @@ from hypothesis import strategies as st
 from shapechanger.demos.episodes import (
     Drop,
     EpisodeMark,
+    EpisodeWriter,
     edit,
     episodes_of,
     merge,
     read_episode,
     repair,
 )
-from shapechanger.errors import BrokenEpisode, DemosError
-from tests.demos.episodes.making import picture, recorded
+from shapechanger.demos.episodes.records import lock
+from shapechanger.errors import BrokenEpisode, DemosError, OutputError
+from tests.demos.episodes.making import header, picture, recorded, step
 
 
 @settings(max_examples=40)
@@ -84,13 +88,30 @@ def test_a_damaged_image_is_detected_and_costs_its_step(tmp_path: Path, harm: st
         os.mkfifo(file)
     elif harm != "missing":
         file.write_bytes(jpeg[:-1] + b"!" * (harm == "changed"))
-    with pytest.raises(BrokenEpisode, match=f"shapechanger demos repair {path}"):  # noqa: PT012
+    where = "line 3 is invalid, because its image 000002.jpg"
+    if harm == "changed":
+        where = "its image 000002.jpg was changed, at step 2"
+    message = f"{path} is damaged: {where}.*shapechanger demos repair {path}"
+    with pytest.raises(BrokenEpisode, match=message):  # noqa: PT012
         episode = read_episode(path)
         episode.jpeg(episode.steps[2])
     assert re.search("^kept 4 steps, moved a line aside, because its image 000002", repair(path))
     read = read_episode(path)
     assert [s.index for s in read.steps] == [0, 1, 3, 4]
     assert [mark.text for mark in read.marks] == ["a door"]
+
+
+def test_all_repairs_are_reported(tmp_path: Path) -> None:
+    path = recorded(tmp_path, close=False)
+    lines = (path / "steps.jsonl").read_bytes().splitlines(keepends=True)
+    for number in (1, 3):
+        lines[number] = lines[number].replace(b"person", b"policy")
+    (path / "steps.jsonl").write_bytes(b"".join(lines))
+    assert repair(path) == (
+        "kept 3 steps, moved a line and 1 more aside, because it is cut off or was changed, "
+        "moved aside unused images: 2, closed it"
+    )
+    assert (path / "lost" / "steps.jsonl").read_bytes() == lines[1] + lines[3]
 
 
 def test_images_without_a_step_are_all_kept(tmp_path: Path) -> None:
@@ -139,3 +160,56 @@ def test_what_cannot_be_merged_is_refused(tmp_path: Path) -> None:
         with pytest.raises(DemosError, match=reason):
             merge(sources, out)
     assert not (tmp_path / "all").exists()
+    (whole / "frames" / "000009.jpg").symlink_to(torn)
+    with pytest.raises(DemosError, match=r"000009\.jpg is a link, but an episode has only files"):
+        merge([whole], tmp_path / "all")
+
+
+def test_episodes_of_the_same_time_differ_in_their_first_step(tmp_path: Path) -> None:
+    steps = [[], [step()], [step(action=(0.5, 0.2))]]
+    for number, added in enumerate(steps):
+        folder = tmp_path / str(number)
+        with EpisodeWriter.create(folder, header(), spare_bytes=0, created="") as writer:
+            for one in added:
+                writer.add(one)
+    out = tmp_path / "all" / "of them"
+    assert len(merge([tmp_path / str(number) for number in range(3)], out)) == 3
+    assert [len(read_episode(path).steps) for path in episodes_of(out)] == [0, 1, 1]
+
+
+def test_a_failed_write_names_the_place_and_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, file = recorded(tmp_path / "data"), tmp_path / "file"
+    file.touch()
+
+    def fail(*paths: Path) -> None:
+        paths[-1].mkdir()
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OutputError, match=f"{file}/all/{path.name}"):
+        merge([path], file / "all")
+    monkeypatch.setattr("shapechanger.demos.episodes.reader.shutil.copytree", fail)
+    with pytest.raises(OutputError, match=f"all/{path.name}.*No space left"):
+        merge([path], tmp_path / "all")
+    assert not list((tmp_path / "all").iterdir())
+    with pytest.raises(OutputError, match="gone/x"):
+        lock(tmp_path / "gone" / "x", "busy")
+    with pytest.raises(OutputError, match=f"{file}/data"):
+        EpisodeWriter.create(file / "data", header(), spare_bytes=0)
+    (path / "frames" / "stray.jpg").touch()
+    (path / "lost").touch()
+    with pytest.raises(OutputError, match=str(path)):
+        repair(path)
+    monkeypatch.setattr("shapechanger.demos.episodes.reader.append", lambda *_: fail(path / "x"))
+    with pytest.raises(OutputError, match=f"{path}/steps.jsonl"):
+        edit(path, EpisodeMark(0))
+    writer = EpisodeWriter.create(tmp_path / "new", header(), spare_bytes=0)
+    shutil.rmtree(writer.path / "frames")
+    with pytest.raises(OutputError, match="frames/000000"):
+        writer.add(step(), picture())
+    writer.path.rename(tmp_path / "moved")
+    with pytest.raises(OutputError, match=str(writer.path)):
+        writer.add(step())
+    (tmp_path / "moved").rename(writer.path)
+    writer.close()

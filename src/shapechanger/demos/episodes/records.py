@@ -367,7 +367,7 @@ def rate_jitter(periods_s: Sequence[float], control_hz: float) -> float:
     if len(periods_s) < _MIN_PERIODS:
         return 0.0
     low, high = np.percentile(periods_s, (5.0, 95.0)) * control_hz
-    return float(min(max(1.0 - low, high - 1.0, 0.0), _MOST_JITTER))
+    return float(min(max(1.0 - low, high - 1.0), _MOST_JITTER))
 
 
 def is_same_rate(recorded_hz: float, control_hz: float, jitter: float = 0.0) -> bool:
@@ -407,10 +407,8 @@ def parse_line(line: bytes) -> Step | Edit | None:
                 return Step.from_json(cast("dict[str, Any]", fields))
             case {"kind": "mark" | "drop" | "keep"} as fields:
                 return _converted(fields, Edit)
-            case dict():
-                return None
             case _:
-                raise ValueError("it is not a JSON object")
+                return None
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
 
