@@ -212,7 +212,7 @@ def test_axis_range_and_the_lack_of_a_motor_can_be_given(edit: Edit) -> None:
     np.testing.assert_allclose(model.joint("foot").range, [-0.2, 0.7])
     np.testing.assert_array_equal(model.joint("foot").axis, [0.0, 1.0, 0.0])
     if isinstance(edit, AddSegment):
-        assert model.geom("foot_geom").size[0] == 0.05
+        np.testing.assert_allclose(model.geom("foot_geom").size, [0.05, 0.05, 0.0])
 
 
 @pytest.mark.parametrize(

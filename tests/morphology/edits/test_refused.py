@@ -72,6 +72,7 @@ def test_numbers_out_of_range_are_refused_when_the_edit_is_made(edit: Edit) -> N
 
 
 def test_the_bounds_are_those_that_are_documented() -> None:
+    assert Gravity((0.0, 0.0, -250.0)).to[2] == -250.0
     for make in (
         *(lambda kind=kind, x=x: kind("a", x) for kind in (Stretch, Radius) for x in (9e-3, 101.0)),
         *(lambda kind=kind, x=x: kind("a", to=x) for kind in _VALUES for x in (-2e6, 2e6)),

@@ -119,6 +119,7 @@ def test_friction_has_three_coefficients(component: Any, place: int) -> None:
         *('<muscle name="a" joint="lower" lengthrange="-1 1" force="3"/>',),
         *('<muscle name="a" joint="lower" lengthrange="-1 1" force=".5"/>',),
         *('<muscle name="a" joint="lower" lengthrange="-1 1" scale="3"/>',),
+        *('<general name="a" joint="lower" biastype="affine" biasprm="1 2 3 7"/>',),
         *('<general name="a" joint="lower" gainprm="3 0 0 5" biastype="affine" biasprm="1 2 3"/>',),
     ],
 )
@@ -316,6 +317,9 @@ def test_halfway_lies_between(ends: tuple[float, float]) -> None:
     half = built(model, PlaceGeom("rod", start, end, amount=0.5))
     assert half.geom("rod").size[1] == pytest.approx(0.3)
     assert half.geom("rod").pos[2] == pytest.approx(0.4)
+    # The ends of a geom given by its ends have one.
+    turned = built(leg(), PlaceGeom("thigh", (0.0, 0.0, -0.3), (0.0, 0.0, 0.1), amount=0.5))
+    assert turned.geom("thigh").size[1] == pytest.approx(0.025)
 
 
 def test_a_geom_is_moved_by_its_middle() -> None:
