@@ -401,3 +401,5 @@ def test_the_disk_is_written_during_the_recording(
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0):
         monkeypatch.setattr("shapechanger.demos.episodes.writer.os.fsync", lambda _: flushed.set())
         assert flushed.wait(20.0)
+        (syncer,) = (each for each in threading.enumerate() if each.name == "episode sync")
+        assert syncer.daemon  # A program that does not close its episode can still exit.
