@@ -203,7 +203,7 @@ def store(robot: KnownRobot) -> str:
     if before != now and not is_loopback(before.host):
         return f"Known here as {name} at {before}, which stays; this one is at {now}."
     remember(robot)
-    moved = "" if before == now else f", now at {now} and no more at {before}"
+    moved = "" if before == now else f", now at {now} instead of {before}"
     return f"Known here as {name}{moved}: `shapechanger robot drive {name}` drives it from here."
 
 

@@ -56,7 +56,7 @@ def test_a_policy_learns_which_key_is_held(keys: Cloned) -> None:
     assert (report.head, policy.net.members) == ("class", 2)
     assert policy.card.steps == 200
     assert "% of the images are mirrored" in training.mirror_note
-    assert policy.card.settings.mirror > 0.3  # The data steer to both sides.
+    assert policy.card.settings.augmentation.mirror > 0.3  # The data steer to both sides.
 
 
 @pytest.mark.parametrize("inputs", ["picture", "state", "both"])
@@ -87,10 +87,10 @@ def test_one_sided_data_are_not_mirrored() -> None:
     data = stripes(200, 0)
     data.actions[data.actions[:, 2] > 0] = [1, 0, 0, 0]
     policy, training = learn(data, settings=_FEW)
-    assert policy.card.settings.mirror == 0.0
+    assert policy.card.settings.augmentation.mirror == 0.0
     assert "one side" in training.mirror_note
     policy, training = learn(data, settings=_FEW, symmetric=True)
-    assert (policy.card.settings.mirror, training.mirror_note) == (0.5, "")
+    assert (policy.card.settings.augmentation.mirror, training.mirror_note) == (0.5, "")
 
 
 @pytest.mark.parametrize("symmetric", [False, True])
@@ -98,7 +98,7 @@ def test_a_layout_without_a_mirror_is_not_mirrored(symmetric: bool) -> None:
     odd = Layout(tuple(Feature(f"joint_{i}/angle", "rad", -1.0, 1.0) for i in range(4)))
     data = replace(stripes(60, 0), action_layout=odd)
     policy, training = learn(data, settings=_FEW, symmetric=symmetric)
-    assert policy.card.settings.mirror == 0.0
+    assert policy.card.settings.augmentation.mirror == 0.0
     assert training.mirror_note == (
         "No image is mirrored, because the mirror image of joint_0/angle is unknown."
     )
