@@ -50,7 +50,8 @@ and a study's numbers depend on: `make mutants` changes one place of a function 
 mutant is killed if a test fails. Changes of only the text of an error, of types for checkers and of
 `strict` of `zip` are not counted, and
 [equivalent mutants](../benchmarks/equivalent_mutants.toml), which no test could notice, are listed
-with their reasons. The survivors follow the table, each with the line that it changed.
+with their reasons. The survivors follow the table, each with the line that it changed. Each row is
+from the last complete run of its module.
 """
 
 
@@ -68,6 +69,7 @@ def mutants() -> Iterator[Row]:
     equivalent = {
         (one["function"], one["line"]) for one in tomllib.loads(_EQUIVALENT.read_text())["mutant"]
     }
+    before = _PAGE.read_text(encoding="utf-8").splitlines()
     page = [_INTRODUCTION, "| module | killed | survived | equivalent |\n| --- | --- | --- | --- |"]
     survivors: list[str] = []
     for name in MODULES:
@@ -80,6 +82,8 @@ def mutants() -> Iterator[Row]:
                     found.append(f"- `{function}`: `{line}`")
         killed, alive = counts["killed"], counts["survived"]
         if counts["did not run"] or not killed + alive:
+            page += [line for line in before if line.startswith(f"| {name} |")]
+            survivors += [line for line in before if line.startswith(f"- `{MODULES[name]}")]
             continue
         survivors += found
         share = killed / (killed + alive)
