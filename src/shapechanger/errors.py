@@ -202,7 +202,13 @@ _Error = TypeVar("_Error", bound=Exception)
 def translate_errors(
     *kinds: type[_Error], to: Callable[[_Error], BaseException]
 ) -> Generator[None]:
-    """Replace errors of these kinds by the error that `to` returns; the original is its cause."""
+    """Replace errors of these kinds by the error that `to` returns; the original is its cause.
+
+    ```python
+    with translate_errors(OSError, to=lambda error: RobotError(f"Cannot read {file}: {error}.")):
+        text = file.read_text()
+    ```
+    """
     try:
         yield
     except kinds as error:
@@ -215,9 +221,16 @@ def check_seed(
     kind: str = "A seed must be",
     largest: int | None = LARGEST_SEED,
 ) -> int:
-    """Return a seed as an integer; raise `error` unless it is a whole number from 0 to `largest`.
+    """Return a seed as an integer.
 
-    Truth values are refused. `largest` is None for no limit, as for NumPy's generators.
+    Args:
+        seed: A whole number, of Python or NumPy; not a truth value.
+        error: Error to raise.
+        kind: Beginning of the message, such as "The seed of a course must be".
+        largest: The largest seed; None for no limit, as for NumPy's generators.
+
+    Raises:
+        ShapechangerError: The given error, if the seed is not a whole number in this range.
     """
     try:
         number = -1 if isinstance(seed, bool) else operator.index(seed)
@@ -232,7 +245,10 @@ def check_seed(
 def no_policy_file(path: Path, words: Iterable[str] = (), what: str = "file") -> str:
     """Return the message about a missing policy file, with the most similar name in its folder.
 
-    `words` are names that are valid instead of a file, such as "reference".
+    Args:
+        path: The missing file.
+        words: Names that are valid instead of a file, such as "reference".
+        what: Noun for the path: "file", or "file or folder".
     """
     siblings = (str(each) for each in path.parent.glob(f"*{glob.escape(path.suffix)}"))
     close = difflib.get_close_matches(str(path), [*words, *sorted(siblings)], n=1)

@@ -28,9 +28,11 @@ _HIGHEST: Final = math.inf
 
 
 class Element(msgspec.Struct, frozen=True):
-    """The part of the embodiment that a feature belongs to, with its name in the model or profile.
+    """The part of the embodiment that a feature belongs to.
 
-    The kind is "task" for a number that belongs to no part, such as a goal.
+    Attributes:
+        kind: Kind of part; "task" for a number that belongs to no part, such as a goal.
+        name: Name in the model or in the robot's profile.
     """
 
     kind: ElementKind
@@ -191,7 +193,11 @@ class Layout(msgspec.Struct, frozen=True):
 
     @classmethod
     def from_json(cls, text: str | bytes) -> Layout:
-        """Read a layout from the JSON of `to_json`; LayoutError for other texts."""
+        """Read a layout from the JSON of `to_json`.
+
+        Raises:
+            LayoutError: If the text is not a layout.
+        """
         try:
             return msgspec.json.decode(text, type=cls)
         except msgspec.MsgspecError as error:

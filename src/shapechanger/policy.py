@@ -50,7 +50,10 @@ _MAX_MEMBERS: Final = 32  # Limits the work that a forged card can cause.
 class Framing(msgspec.Struct, frozen=True, kw_only=True):
     """Crop and resolution of the images of a policy.
 
-    The share `top` of the rows, in [0, 1), is cut off; `height` and `width` are in pixels.
+    Attributes:
+        height: Rows of the reduced image.
+        width: Columns of the reduced image.
+        top: Share of the rows that is cut off at the top, in [0, 1).
     """
 
     # Half the resolution of a 160 x 120 image, without the top fifth, in which a camera a few
@@ -75,12 +78,14 @@ class CloneNetwork(msgspec.Struct, frozen=True, kw_only=True):
     """Architecture of a policy that was cloned from demonstrations.
 
     Attributes:
+        framing: Part of the image that the policy sees.
         channels: Filters of each convolution.
         features: Number of features between image and actions.
         eyes: Input of the first layer: "colours" or "edges" of an image; "none" without images.
         nerves: Widths of the layers for the state; () without a state.
         members: Number of networks whose outputs are averaged.
         classes: Actions to choose from; () for continuous actions.
+        class_names: Names of the classes.
         unseen: Names of state values that the policy ignores.
         low: Action for an output of -1; () for -1 each.
         high: Action for an output of 1; () for 1 each.
@@ -122,8 +127,11 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
         env: The env of the training; None for recordings.
         observation: Layout of the observed numbers; None for images alone.
         action: Layout of the actions; None for steering and throttle in [-1, 1] of any vehicle.
+        learner: Name of the learner.
         settings: Settings of the learner; None in an ONNX file.
         steps: Env steps of the training; for a clone, the number of demonstrated steps.
+        seed: Seed of the training.
+        version: Version of Shapechanger.
         identity: Identities of the env and the learner, see `shapechanger.transfer.identities`.
         command: The command that wrote the file; empty in a study, whose `study.json` has it.
         start_log_std: If the training started from another policy, the initial logarithm of the
@@ -216,15 +224,21 @@ def _text(layout: Layout | None) -> str:
 
 
 class Policy(ABC):
-    """A policy of any kind, with its provenance as `card`."""
+    """A policy of any kind.
+
+    Attributes:
+        card: Provenance of the policy.
+    """
 
     card: PolicyCard
 
     @abstractmethod
     def act(self, observations: Any) -> NDArray[Any]:
-        """Return actions, shape (n, m), for observations of an env, shape (n, ...).
+        """Return an action for each observation of an env, shape (n, m).
 
-        For a clone that needs images and a state, they are a mapping with `image` and `state`.
+        Args:
+            observations: Shape (n, ...); for a clone that needs images and a state, a mapping with
+                `image` and `state`.
         """
 
     def tensors(self) -> dict[str, NDArray[Any]]:
@@ -245,7 +259,7 @@ class Policy(ABC):
 
 
 class OnnxPolicy(Policy):
-    """A trained policy from an ONNX file, which does not need PyTorch."""
+    """A trained policy from an ONNX file; its network, `run`, does not need PyTorch."""
 
     def __init__(self, card: PolicyCard, run: Network) -> None:
         self.card, self._run = card, run
@@ -384,6 +398,10 @@ def export_network(
     The arguments of its `forward` are the inputs in their order. Each value of `inputs` is an
     example of shape (2, ...), whose first axis may have any length in the file. The last key of the
     card's `shapes` is the name of the output. `facts` are additional metadata.
+
+    Raises:
+        MissingExtra: If onnx or onnxscript is not installed.
+        OutputError: If the file cannot be written.
     """
     with translate_errors(ImportError, to=lambda _: MissingExtra("onnxscript", "onnx")):
         operators: Any = import_module("onnxscript").opset18

@@ -34,7 +34,11 @@ class DriveReward:
 
     @classmethod
     def from_weights(cls, weights: Mapping[str, float]) -> DriveReward:
-        """Create the reward from weights that replace the defaults, keyed by name."""
+        """Create the reward from weights that replace the defaults, keyed by name.
+
+        Raises:
+            UnknownName: If there is no such weight.
+        """
         kinds: dict[str, Any] = {field.name: type(field.default) for field in fields(cls)}
         for name in weights:
             if name not in kinds:
@@ -44,13 +48,17 @@ class DriveReward:
     def terms(
         self, speed_mps: float | None, collided: bool | None, stalled: bool | None, dt_s: float
     ) -> dict[str, float]:
-        """Return the terms of one step, whose sum is the reward, without unknown quantities.
+        """Return the terms of one step; the reward is their sum.
 
         Args:
             speed_mps: Forward speed, m/s, negative backwards; None if it is not measured.
             collided: Whether the robot has collided since the last step; None if unknown.
             stalled: Whether the robot pushes without moving; None if unknown.
             dt_s: Duration of the step, s, at least 0.
+
+        Returns:
+            `reward_velocity`, `reward_collision` and `reward_stall`, each only if its quantity is
+            not None; finite if the quantities are finite.
         """
         terms: dict[str, float] = {}
         if speed_mps is not None:

@@ -59,7 +59,10 @@ class EnvRef(msgspec.Struct, frozen=True):
         return EnvRef(self.id, {name: v for name, v in self.kwargs.items() if name != argument})
 
     def make(self, **more: Any) -> gym.Env[Any, Any]:
-        """Make the env, with more arguments for this instance only, such as `render_mode`.
+        """Make the env.
+
+        Args:
+            **more: Arguments for this instance only, such as `render_mode`.
 
         Raises:
             UnknownName: If no env has this id.
@@ -223,7 +226,11 @@ def is_reward_term(name: str) -> bool:
 
 
 def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
-    """Return the observation and the action layout of the outermost wrapper that publishes them."""
+    """Return the observation and the action layout of the outermost wrapper that publishes them.
+
+    Raises:
+        LayoutError: If neither a wrapper nor the env publishes layouts.
+    """
     names = ("observation_layout", "action_layout")
     found = [env.get_wrapper_attr(n) for n in names if env.has_wrapper_attr(n)]
     layouts = [layout for layout in found if isinstance(layout, Layout)]

@@ -36,10 +36,16 @@ def clipped(action: ActionPlan, value: float) -> bool:
 
 
 def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> float:
-    """Return the next value between `now`, which was set `elapsed_s` seconds ago, and the target.
+    """Return the next value on the way to the target.
 
     The slew limits the change away from rest and towards rest. A value that changes to the other
     side of rest stays at rest for one step. A three-level motor has no slew.
+
+    Args:
+        action: The action.
+        now: Current value.
+        aim: Target value.
+        elapsed_s: Time since the current value was set, s.
     """
     is_away, will_be_away = now - action.rest, aim - action.rest
     if is_away < 0.0 < will_be_away or will_be_away < 0.0 < is_away:
@@ -109,14 +115,17 @@ class Bump:
 
 
 class Stall:
-    """Detect a push above `threshold` without motion for `after_s` seconds, 0 to disable.
+    """Detect a push without motion, and block further pushing in this direction.
 
-    Further pushing in this direction is blocked until a command requests rest or the other
-    direction.
+    The block ends as soon as a command requests rest or the other direction.
 
     Attributes:
         way: Sign of the push that stalled; 0 for none.
         watches: Whether a measured speed is available.
+
+    Args:
+        after_s: Longest push without motion, s; 0 to disable.
+        threshold: Push above which motion is expected.
     """
 
     def __init__(self, after_s: float, threshold: float) -> None:

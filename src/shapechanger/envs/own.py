@@ -89,7 +89,11 @@ def compiling(path: Path, verb: str = "compile") -> Generator[None]:
 
 @dataclass(frozen=True)
 class OwnFamily(Family):
-    """The bodies that edits make from a user's robot in the file `path`."""
+    """The bodies that edits make from a user's robot.
+
+    Attributes:
+        path: The robot's file. Families are the same only if file and rig are the same.
+    """
 
     path: Path = Path()
 
@@ -103,6 +107,11 @@ class OwnFamily(Family):
 
         A file that a URDF names as `package://NAME/REST` is searched in each folder NAME that
         contains the URDF, or that lies next to a folder that contains the URDF.
+
+        Raises:
+            BrokenModel: If MuJoCo cannot read or compile the model, a mesh is a COLLADA file, or no
+                folder has a file of a package.
+            MorphologyError: If the rig does not fit the model.
         """
         with compiling(Path(path), "read"):
             spec = mujoco.MjSpec.from_file(str(path))
@@ -138,9 +147,16 @@ def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
 
 
 def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
-    """Return the family of a user's robot, from its file or its name in `robot_descriptions`.
+    """Return the family of a user's robot.
 
-    The rig's edits are applied before those of any body.
+    Args:
+        path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
+            `go2_mj_description`, which downloads it.
+        rig: Edits that are applied before those of any body.
+
+    Raises:
+        UnknownName: If there is no such file, or the package has no robot of this name.
+        MorphologyError: If the path is a folder, or the package is missing or fails.
     """
     file = Path(path).expanduser()
     if not file.is_file():
@@ -221,8 +237,10 @@ class OwnRobotEnv(Reshapable, EzPickle):
         **arguments: Arguments of Gymnasium's `MujocoEnv` and of `Reshapable`.
 
     Attributes:
-        task: The task; `task_name` is its name.
+        task: The task.
+        task_name: Name of the task.
         measures: Metrics of a policy, the default first.
+        reset_noise_scale: The argument of this name.
     """
 
     # `gym.make` reads the modes from the class; the rate of the frames depends on the model.

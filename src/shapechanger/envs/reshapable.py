@@ -249,7 +249,12 @@ class Reshapable(MujocoEnv):
         return bool(cast("Any", self.data.warning).number[BAD_STATE].any())
 
     def reset_model(self) -> NDArray[np.float64]:
-        """Draw a start state as Gymnasium does, and make it feasible, see `StartRules.feasible`."""
+        """Draw a start state as Gymnasium does, and make it feasible.
+
+        Joints that the noise moved beyond their limits are moved back, orientations are normalised,
+        equalities such as coupled joints and closed loops are satisfied, and a trunk whose feet the
+        noise pushed into the floor is lifted.
+        """
         self._starting = True
         try:
             return self._draw_start()
@@ -342,7 +347,11 @@ class Reshapable(MujocoEnv):
     def certify_shift(
         source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
     ) -> Certificate:
-        """Compare the envs of a transfer, including their wrappers; both are reset."""
+        """Compare the envs of a transfer, including their wrappers; both are reset.
+
+        Raises:
+            EmptyShift: If the envs do not differ and `allow_empty` is false.
+        """
         return certify(source, target, allow_empty=allow_empty)
 
     @property

@@ -75,7 +75,13 @@ class Runner(Reshapable):
     above the floor. The standing height is the height in the start pose, because these legs are
     folded if joints are in the middle of their ranges.
 
+    Args:
+        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON; None
+            for the family's first.
+        **arguments: All arguments of Gymnasium's env and of `Reshapable`.
+
     Attributes:
+        measures: Metrics of a policy.
         root: Types of the joints that determine the trunk's position.
         place_size: How many numbers of the trunk's position the observation omits by default.
         velocity_limit: Limit to which observed velocities are clipped, m/s and rad/s.
@@ -115,7 +121,14 @@ class HealthyRunner(Runner):
     """Runner that is healthy while its trunk is neither too low nor too high.
 
     For the unedited body the heights are Gymnasium's; for any other they scale with its standing
-    height. They are positions of the joint that raises the trunk, m.
+    height.
+
+    Args:
+        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON; None
+            for the family's first.
+        healthy_z_range: Heights of the trunk between which the body is healthy, m, as positions of
+            the joint that raises it; None derives them from the body.
+        **arguments: All other arguments of Gymnasium's env.
     """
 
     _healthy_z_range: tuple[float, float]

@@ -186,7 +186,11 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         return self.backlash + self.least_tension / self.tendon_stiffness
 
     def replace(self, **changes: Any) -> FingerParameters:
-        """A copy with some parameters replaced."""
+        """A copy with some parameters replaced.
+
+        Raises:
+            FingerError: If the changed parameters are invalid.
+        """
         return msgspec.structs.replace(self, **changes)
 
     def to_json(self) -> str:
@@ -195,7 +199,11 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
     @classmethod
     def from_json(cls, text: str | bytes) -> FingerParameters:
-        """Decode the result of `to_json`, or raise a FingerError."""
+        """Decode the result of `to_json`.
+
+        Raises:
+            FingerError: If the text is not a valid finger.
+        """
         try:
             return msgspec.json.decode(text, type=cls)
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:

@@ -46,14 +46,27 @@ class FingertipPath:
 
     A closed path is periodic, also before 0 s. An open path begins at 0 s and ends at `duration_s`.
     Before its beginning and after its end, the point is at rest.
+
+    Attributes:
+        position: Function that maps times from 0 to `duration_s`, s, shape (n,), to positions, m,
+            shape (n, 3).
+        duration_s: Period of a closed path, or duration of an open one, s, above 0; infinite for an
+            endless function.
+        closed: Whether the path is periodic.
     """
 
-    position: Callable[[Array], Array]  # Maps times, 0 to `duration_s`, (n,), to m, (n, 3).
-    duration_s: float  # Period, or duration of an open path; infinite for an endless function.
-    closed: bool  # Whether the path is periodic.
+    position: Callable[[Array], Array]
+    duration_s: float
+    closed: bool
 
     def at(self, t: ArrayLike) -> Array:
-        """Return positions in the finger's frame, m, (..., 3), at finite times, s, (...).
+        """Return the positions of the point at times.
+
+        Args:
+            t: Times, s, finite, of any shape and sign.
+
+        Returns:
+            Positions in the finger's frame, m, shape (..., 3).
 
         Raises:
             PathError: If a time is not finite, or a function returns no position for it.
@@ -364,12 +377,17 @@ KINDS: Final = tuple(_SHAPES)
 
 
 def as_path(value: PathSource) -> FingertipPath:
-    """Return the path that a value describes, or raise UnknownName or PathError.
+    """Return the path that a value describes.
 
-    The value is a path; the name of a shape, one of `KINDS`; a mapping with such a name as "kind"
-    and with arguments of the function that makes the shape, such as
-    `{"kind": "circle", "radius": 0.01, "hz": 1.0}`; the name of a .csv file for `from_csv`; or a
-    function for `from_callable`, which makes an endless path.
+    Args:
+        value: A path; the name of a shape, one of `KINDS`; a mapping with such a name as "kind" and
+            with arguments of the function that makes the shape, such as
+            `{"kind": "circle", "radius": 0.01, "hz": 1.0}`; the name of a .csv file for `from_csv`;
+            or a function for `from_callable`, which makes an endless path.
+
+    Raises:
+        UnknownName: If the name of the shape or of a setting is unknown.
+        PathError: If the value has another type, or the path is invalid.
     """
     given: Any = value
     if isinstance(given, FingertipPath):

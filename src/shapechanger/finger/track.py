@@ -29,10 +29,11 @@ _OFF_M: Final = 0.0005
 
 
 def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
-    """Return the first angles on a path, rad, (4,), or raise a PathError.
+    """Require that the nominal finger can follow a path, and return its first angles, rad, (4,).
 
-    The error states the time at which a point is out of reach of the nominal finger, or its tendons
-    are too weak for the motion.
+    Raises:
+        PathError: If a point is out of reach, or the tendons are too weak for the motion; the
+            message names the time and what is missing.
     """
     length = min(path.duration_s, _LOOK_S)
     # 1.1 s at 50 Hz are 55.00000000000001 steps.

@@ -42,7 +42,12 @@ def to_json(body: Iterable[Edit]) -> str:
 
 
 def from_json(text: str | bytes) -> Body:
-    """Read a body from JSON as `to_json` writes it; a single object is a body of one edit."""
+    """Read a body from JSON as `to_json` writes it; a single object is a body of one edit.
+
+    Raises:
+        UnknownName: If an edit has an unknown kind or an unknown field.
+        MorphologyError: If the text is not such a list, or a number is out of its range.
+    """
     try:
         # A text that was read from a file may begin with a byte-order mark.
         parsed: Any = json.loads(text.removeprefix("\ufeff") if isinstance(text, str) else text)
@@ -52,7 +57,12 @@ def from_json(text: str | bytes) -> Body:
 
 
 def as_body(value: Edit | Iterable[Edit] | str) -> Body:
-    """Return a body from one edit, several, or their JSON, which may be parsed already."""
+    """Return a body from one edit, several, or their JSON, which may be parsed already.
+
+    Raises:
+        UnknownName: If an edit has an unknown kind or an unknown field.
+        MorphologyError: If `value` is something else, or a number is out of its range.
+    """
     if isinstance(value, str):
         return from_json(value)
     given: Any = value  # Not checked at run time.

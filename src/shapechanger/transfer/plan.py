@@ -32,7 +32,12 @@ _MIN_SEEDS: Final = 2
 
 
 class TransferTask(msgspec.Struct, frozen=True):
-    """The two envs of a transfer: a policy is trained in the source and moved to the target."""
+    """The two envs of a transfer.
+
+    Attributes:
+        source: The env that the policy is trained in.
+        target: The env that the policy is transferred to.
+    """
 
     source: EnvRef
     target: EnvRef
@@ -42,8 +47,12 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     """Everything that determines the numbers of a study.
 
     Attributes:
+        task: Source and target.
+        body_map: Map between the layouts of source and target.
         measure: Quantity by which runs are compared: the name of a measure of the target, of one of
             its reward terms, or "return".
+        unit: Unit of the measure.
+        learner: Name of the learner.
         settings: Settings of the learner, the same in every arm.
         steps: Target steps of each run of scratch and fine-tune.
         source_steps: Training steps of each source policy.

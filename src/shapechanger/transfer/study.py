@@ -66,9 +66,11 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     """Result of a study.
 
     Attributes:
+        plan: Plan of the study.
         command: The command that ran the study; empty if it was called from Python.
         machine: Operating system and processor architecture of the machine.
         shift: The certificate of the shift as text; empty if the envs publish none.
+        runs: Every run with its learning curve.
         source_return: Mean return of the source policies in the source, one for each seed; empty
             if a policy was given.
         summaries: Measures of transfer of each arm except scratch.
@@ -106,7 +108,13 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class TaskTraits(NamedTuple):
-    """Properties of the two envs, and the certificate of the shift; empty if they publish none."""
+    """Properties of the two envs of a study.
+
+    Attributes:
+        source: Properties of the source.
+        target: Properties of the target.
+        shift: The certificate of the shift as text; empty if the envs publish none.
+    """
 
     source: EnvTraits
     target: EnvTraits
@@ -114,7 +122,11 @@ class TaskTraits(NamedTuple):
 
 
 def inspect_task(task: TransferTask) -> TaskTraits:
-    """Make both envs of a task once, and read their traits; EmptyShift if they do not differ."""
+    """Make both envs of a task once, and read their traits for a study.
+
+    Raises:
+        EmptyShift: If source and target do not differ.
+    """
     with closing(task.source.make()) as source, closing(task.target.make()) as target:
         one, other = env_traits(source, task.source.id), env_traits(target, task.target.id)
         return TaskTraits(

@@ -32,16 +32,29 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     """Envs that are stepped together, with the results of Gymnasium's `SyncVectorEnv`.
 
     MuJoCo steps outside Python's lock, so threads share the cores; each has a range of neighbouring
-    envs. Observations, rewards, ends and infos equal `SyncVectorEnv`'s to the last bit, with any
-    number of threads and after any edit of an env's model. It differs in two ways: actions are
+    envs. Observations, rewards, ends and infos equal `SyncVectorEnv`'s to the last bit, with
+    any number of threads and after any edit of an env's model. It differs in two ways: actions are
     checked before any env steps, and an env whose simulation diverges is terminated with
     `info["diverged"]` (see `SubEnv`).
 
     If an env raises, the others finish the step; on Ctrl-C, the threads do. The envs are then no
     longer at the same step, so the next call must be `reset` or `close`.
 
-    `shapechanger.make_vec` makes it, from one function per env. With `render_mode="human"` one
-    thread steps all envs, because one thread must draw all windows.
+    `shapechanger.make_vec` makes it.
+
+    Args:
+        makers: One function per env that makes it; all envs have the same Box spaces.
+        threads: Number of threads, including the caller's; at least 1. With
+            `render_mode="human"` it is 1, because one thread must draw all windows.
+        autoreset_mode: When to reset an env whose episode has ended; see Gymnasium's documentation.
+        copy: Whether to return copies of the observations; otherwise the next step overwrites them.
+
+    Attributes:
+        envs: The envs.
+
+    Raises:
+        VectorEnvError: If there are no envs or no threads, or a space is not a Box.
+        SpaceMismatch: If the spaces of two envs differ.
     """
 
     envs: list[gym.Env[Any, Any]]
@@ -130,7 +143,8 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     ) -> tuple[NDArray[Any], list[dict[str, Any]]]:
         """Start an episode in each env, or in the `chosen` ones, as `reset` does.
 
-        Return the observations of all envs, and the info of each, empty if it was not reset.
+        Returns:
+            The observations of all envs, and the info of each, empty if it was not reset.
         """
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         numbers = list(range(self.num_envs) if chosen is None else chosen)
@@ -288,7 +302,15 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of each env to a value, or to one value per env in a list or tuple."""
+        """Set an attribute of each env.
+
+        Args:
+            name: Name of the attribute.
+            values: A list or tuple with one value per env, or one value for all.
+
+        Raises:
+            VectorEnvError: If the numbers of values and envs differ.
+        """
         several = isinstance(values, list | tuple)
         each = cast("Sequence[Any]", values if several else [values] * self.num_envs)
         if len(each) != self.num_envs:

@@ -34,9 +34,14 @@ if wp.config.log_level == wp.LOG_INFO:
 
 
 def find_device(name: str | None) -> str:
-    """Return the name of a device that Warp and torch can both use, such as `cpu` or `cuda:0`.
+    """Return the name of a device that Warp and torch can both use.
 
-    None gives the first GPU, or the CPU if there is no GPU.
+    Args:
+        name: Name of the device, such as `cpu` or `cuda:0`; None for the first GPU, or for the CPU
+            if there is no GPU.
+
+    Raises:
+        UnknownName: If there is no such device.
     """
     gpus = min(int(wp.get_cuda_device_count()), torch.cuda.device_count())
     known = ["cpu", *(f"cuda:{number}" for number in range(gpus))]

@@ -52,17 +52,27 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     that a world draws from a pool depends on the same two numbers.
 
     A step waits for the device once, to check that actions are finite, and copies nothing to it.
+    `shapechanger.make_vec` makes the env.
 
-    `shapechanger.make_vec` makes it. With `redraws`, `bodies` is a pool, of which each start of an
-    episode draws one; otherwise it has the body of each world, None for the reader's default.
+    Args:
+        reader: Compiles bodies.
+        bodies: The body of each world, None for the reader's default; or, with `redraws`, the pool
+            of bodies.
+        num_envs: Number of worlds.
+        device: Name of the device, such as `cuda:0`.
+        redraws: Whether `bodies` is a pool, of which each start of an episode draws one.
+        limits: The limits `nconmax` and `njmax`, as in `make_vec`.
+        task_infos: Whether steps return the infos of the CPU env.
 
     Attributes:
+        device: Name of the device.
         batches: The worlds, by the shapes of their arrays.
         made_from: The spec of the CPU env, or None.
         max_episode_steps: Steps after which an episode is truncated; None for never.
         episode_steps: Steps of each world's episode so far, shape (n,); it may be written.
-        observation_layout: Name, unit and range of each number of the first batch's observations;
-            `action_layout` describes its actions.
+        observation_layout: Name, unit and range of each number of an observation of the first
+            batch.
+        action_layout: Name, unit and range of each number of an action of the first batch.
     """
 
     observation_space: gym.Space[Any]

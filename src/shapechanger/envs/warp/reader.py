@@ -89,7 +89,16 @@ def register_reader(env_class: type, reader: _MakeReader) -> None:
 
 
 def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyReader:
-    """Return the reader of a task's bodies; arguments as for `BodyReader`."""
+    """Return the reader of a task's bodies.
+
+    Args:
+        env_id: Full id of the task.
+        make: Makes a CPU env of the task from arguments.
+        arguments: Arguments of the first CPU env.
+
+    Raises:
+        VectorEnvError: If the task has no batched functions, or mujoco-warp has another version.
+    """
     follow_mujoco()
     first = make(arguments)
     for module in {task.device for task in FINGER_ENVS.values()}:

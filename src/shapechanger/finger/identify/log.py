@@ -150,7 +150,15 @@ class _Header(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
-    """Write a log to a file, replacing an existing one; no suffix is added to the path."""
+    """Write a log to a file, replacing an existing one.
+
+    Args:
+        log: The log.
+        path: File to write; no suffix is added.
+
+    Raises:
+        OutputError: If the file cannot be written.
+    """
     own: dict[str, Any] = {key: getattr(log, key) for key in _SETTINGS}
     header = _Header(
         format="shapechanger finger log", version=1, joints=JOINTS, tendons=TENDONS, **own
@@ -203,8 +211,16 @@ def record_babble(
 ) -> FingerLog:
     """Record a log of a finger that `FingerBabble` moves.
 
-    The env is a finger, simulated or on a rig, without a time limit, in which actions have the
-    meaning `actions`. A FingerError is raised if the episode ends too early.
+    Args:
+        env: Env with the layout of a finger, simulated or on a rig, without a time limit.
+        seconds: Duration, s.
+        seed: Seed of the motions and of the env.
+        actions: Mode of action of the env, such as "impedance".
+
+    Raises:
+        LayoutError: If the env publishes no layouts.
+        UnknownName: If the env's layout is not a finger's, or no mode of action is named `actions`.
+        FingerError: If the env's observations are not a vector, or the episode ends too early.
     """
     if not isinstance(env.observation_space, gym.spaces.Box):
         raise FingerError("Recording a finger needs Box observations: omit `goal`.")

@@ -81,14 +81,23 @@ _UNITS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class ParameterEstimate:
-    """One parameter of a finger with its 95 % interval."""
+    """One parameter of a finger with its 95 % interval.
 
-    name: str  # Name, such as `moment_arms/FDP/MCP_flexion`.
-    unit: str  # SI unit.
-    value: float  # Estimate.
-    low: float  # Lower end of the interval.
-    high: float  # Upper end of the interval.
-    nominal: float  # Value of the nominal finger; infinite for `tendon_stiffness`.
+    Attributes:
+        name: Name, such as `moment_arms/FDP/MCP_flexion`.
+        unit: SI unit of the four values below.
+        value: Estimate.
+        low: Lower end of the interval.
+        high: Upper end of the interval.
+        nominal: Value of the nominal finger; infinite for `tendon_stiffness`.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    nominal: float
 
     @property
     def differs(self) -> bool:
@@ -115,14 +124,23 @@ class HeldOut:
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedFinger:
-    """Result of `identify`."""
+    """Result of `identify`.
 
-    parameters: FingerParameters  # The finger, for the env's argument `parameters`.
-    estimates: tuple[ParameterEstimate, ...]  # Identified parameters, the moment arms first.
-    undetermined: tuple[tuple[str, str], ...]  # Names of other parameters, each with the reason.
+    Attributes:
+        parameters: The finger, for `build_finger` or the env's argument `parameters`.
+        estimates: Identified parameters with intervals, the moment arms first.
+        undetermined: Names of parameters that the log cannot determine, each with the reason.
+        held_out: Validation on the part of the log that was not fitted.
+        source: Source named in the log.
+        seconds: Length of the log, s.
+    """
+
+    parameters: FingerParameters
+    estimates: tuple[ParameterEstimate, ...]
+    undetermined: tuple[tuple[str, str], ...]
     held_out: HeldOut
-    source: str  # Source named in the log.
-    seconds: float  # Length of the log, s.
+    source: str
+    seconds: float
 
     @property
     def arms(self) -> tuple[ParameterEstimate, ...]:
@@ -147,9 +165,14 @@ def identify(log: FingerLog, progress: Callable[[str], None] = lambda _: None) -
     four fifths of the motion by `mujoco.sysid`. The last fifth is simulated for validation. On the
     path of a rig, tensions do not show delays below a period, so the motion determines the delay.
 
-    In a log of, for example, ten seconds, each joint must move through much of its range under
-    varying tensions. `progress` is called with the name of each step before it starts. Raises a
-    FingerError if the log is too short, or a joint hardly moves or moves only with others.
+    Args:
+        log: A log, such as of ten seconds, in which each joint moves through much of its range
+            under varying tensions.
+        progress: Called with the name of each step before it starts.
+
+    Raises:
+        FingerError: If the log is too short, or a joint hardly moves or moves only with others.
+        MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
     """
     require_informative(log)
     progress("arms and stretch, from lengths")

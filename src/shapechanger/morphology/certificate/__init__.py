@@ -330,8 +330,11 @@ def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None)
     Writing mass without inertia, or either without calling `mujoco.mj_setConst`, leaves an
     inconsistent model: MuJoCo softens contacts and limits by inverse weights that no longer hold,
     copies frames that no longer coincide, and ignores gravity compensation, adhesion or an
-    actuator's damping if there was none when the model was compiled. Where a mass differs from the
-    mass of the same body of `source`, the inertia must differ too.
+    actuator's damping if there was none when the model was compiled.
+
+    Args:
+        model: The model.
+        source: Another model with the same bodies; where a mass differs, the inertia must differ.
     """
     names, owner, found = names_of(model), model.geom_bodyid, list[str]()
     before = names_of(source)["bodies"] if source else []

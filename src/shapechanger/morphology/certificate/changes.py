@@ -120,9 +120,14 @@ def compare(
 ) -> tuple[Change, ...]:
     """Return the differences between two models that decide their motion.
 
-    Standing height, dimensions and total mass come first, then each element. `standing_height` has
-    the heights at which source and target stand, m, if known. Models whose elements have the same
-    names and numbers have no changes.
+    Args:
+        source: The model that a policy is trained on.
+        target: The model that it is transferred to.
+        standing_height: Heights at which the source and the target stand, m; None if unknown.
+
+    Returns:
+        The changes: standing height, dimensions and total mass first, then element by element.
+        Empty for models whose elements have the same names and numbers.
     """
     robot: list[_Row] = [("standing height", "robot", *standing_height, "m")]
     one, two = moved_numbers(source), moved_numbers(target)

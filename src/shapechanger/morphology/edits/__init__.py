@@ -102,14 +102,28 @@ class Edit(
         """Refuse values that do not fit each other; subclasses override it."""
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Change `spec` in place, or refuse with an UnknownName or a MorphologyError."""
+        """Change `spec` in place.
+
+        Raises:
+            UnknownName: If the edit names an element that the model lacks.
+            MorphologyError: If the element cannot be changed this way.
+        """
         raise NotImplementedError
 
     def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
-        """Make the change in the keyframes too, after `apply`; most edits change none."""
+        """Make the change in the keyframes too, after `apply`; most edits change none.
+
+        Args:
+            spec: The changed specification, without its keyframes.
+            keyframes: The keyframes.
+        """
 
     def require_effect(self, spec: mujoco.MjSpec) -> None:
-        """Refuse an edit of something that the model's options switch off."""
+        """Refuse an edit of something that the model's options switch off.
+
+        Raises:
+            MorphologyError: If the edit would have no effect.
+        """
         if self.needs is not None and spec.option.disableflags & int(self.needs[0]):
             raise MorphologyError(
                 f"{type(self).__name__} would change nothing, because the model switches "

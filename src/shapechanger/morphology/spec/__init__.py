@@ -100,6 +100,10 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
 
     A body is named after `bodies_by_joint`, or its joint, or its parent; an actuator after the
     element that it drives; anything else after its body. Names change no physics.
+
+    Args:
+        spec: The model.
+        bodies_by_joint: Names for unnamed bodies, keyed by the names of their joints.
     """
     chosen = bodies_by_joint or {}
     free = unique_namer(body.name for body in spec.bodies)

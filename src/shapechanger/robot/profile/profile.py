@@ -87,10 +87,15 @@ _SI: Final = {"deg": ("rad", math.pi / 180.0)}
 
 
 class ResetStep(NamedTuple):
-    """One step of the reset routine."""
+    """One step of the reset routine.
 
-    values: tuple[float, ...]  # One number for each action, in order.
-    seconds: float  # Duration, s.
+    Attributes:
+        values: One number for each action, in order.
+        seconds: Duration, s.
+    """
+
+    values: tuple[float, ...]
+    seconds: float
 
 
 _A_DATE: Final = "a date, such as 2026-11-03"
@@ -134,14 +139,21 @@ class CommandTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Profile(GuardPlan, RobotTable, CommandTable):
-    """A robot: actions, outputs, sensors, limits, camera and reward."""
+    """A robot: actions, outputs, sensors, limits, camera and reward.
 
-    path: Path  # File of the profile.
-    camera: CameraPlan | None  # Plan of the camera; None for a robot without a camera.
-    # Weights of the reward, as in `Welcome.reward`: "velocity" per metre forward, "collision" per
-    # collision, "stall" per second of stall, and "collision_ends_episode", 1 or 0.
+    Attributes:
+        path: File of the profile.
+        camera: Plan of the camera; None for a robot without a camera.
+        reward: Weights of the reward, as in `Welcome.reward`: "velocity" per metre forward,
+            "collision" per collision, "stall" per second of stall, and "collision_ends_episode",
+            1 or 0.
+        reset: The reset routine; empty for none.
+    """
+
+    path: Path
+    camera: CameraPlan | None
     reward: dict[str, float]
-    reset: tuple[ResetStep, ...]  # The reset routine; empty for none.
+    reset: tuple[ResetStep, ...]
 
     @property
     def turning(self) -> tuple[float, float] | None:

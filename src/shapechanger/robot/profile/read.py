@@ -118,7 +118,15 @@ GIVEN: Final = ("name", "measures", "settings", "rows")
 
 
 def read_profile(text: str, path: Path) -> Profile:
-    """Decode a profile; a ProfileError names the file `path` and the line."""
+    """Decode a profile.
+
+    Args:
+        text: Text of the profile, in TOML.
+        path: File of the text, for error messages.
+
+    Raises:
+        ProfileError: If the text is not a valid profile; the message names the file and the line.
+    """
     text = text.replace("\r\n", "\n")
     root = Table(path, text, (), _toml(text, path))
     for name in root.keys:

@@ -22,18 +22,30 @@ _R = TypeVar("_R")
 
 
 class Whereabouts(NamedTuple):
-    """True state of the vehicle."""
+    """True state of the vehicle.
 
-    x: float  # Position along the x axis, m.
-    y: float  # Position along the y axis, m.
-    heading: float  # Angle from the x axis, rad, counter-clockwise seen from above.
-    speed: float  # Speed along the heading, m/s.
-    travelled_m: float  # Distance rolled by the wheels, m; it decreases while driving backward.
-    bumped: bool  # Whether the bumper is pressed.
-    distance_m: float  # Free distance ahead of the nose, m.
-    # Quantities that no sensor measures, such as the progress along a course, keyed by name.
+    Attributes:
+        x: Position along the x axis, m.
+        y: Position along the y axis, m.
+        heading: Angle from the x axis, rad, counter-clockwise seen from above.
+        speed: Speed along the heading, m/s.
+        travelled_m: Distance rolled by the wheels, m; it decreases while driving backward.
+        bumped: Whether the bumper is pressed.
+        distance_m: Free distance ahead of the nose, m.
+        truth: Quantities that no sensor measures, such as the progress along a course, keyed by
+            name.
+        t: Time of the twin, ns.
+    """
+
+    x: float
+    y: float
+    heading: float
+    speed: float
+    travelled_m: float
+    bumped: bool
+    distance_m: float
     truth: dict[str, float]
-    t: int  # Time, ns.
+    t: int
 
 
 def _at_board(
@@ -55,8 +67,13 @@ def _at_board(
 class Operator:
     """A person next to the robot, who moves the vehicle, causes faults and presses buttons.
 
-    Each request takes effect after all calls that the robot's processes have sent before it. The
-    `path` is the socket on which the board listens.
+    Each request takes effect after all calls that the robot's processes have sent before it.
+
+    Args:
+        path: Socket on which the board listens.
+
+    Raises:
+        RobotError: If no board listens on the socket.
     """
 
     _client: BoardClient
@@ -72,7 +89,11 @@ class Operator:
         self.close()
 
     def advance(self, seconds: float) -> int:
-        """Advance the twin's clock and return its time, ns; a board in real time refuses."""
+        """Advance the twin's clock and return its time, ns.
+
+        Raises:
+            RobotError: If the board runs in real time.
+        """
         return self._client.ask(Slept, "sleep", round(seconds * 1e9)).t
 
     @_at_board

@@ -33,8 +33,15 @@ _LOG: Final = 2000  # Length of the end of a log in error notes, characters.
 class RunningRobot:
     """A robot that is served by processes on this machine until `close`.
 
-    Its `folder` has the twin's ledger and socket, the key and the log; `close` removes it if it is
-    `temporary`.
+    Args:
+        temporary: Whether `close` removes the folder.
+
+    Attributes:
+        folder: Folder of the robot's files: the twin's ledger and socket, the key and the log.
+        supervisor: Process of the robot's supervisor.
+
+    Raises:
+        RobotError: If the robot does not start.
     """
 
     def __init__(
@@ -83,7 +90,11 @@ class RunningRobot:
         return Operator(BoardAt(self.folder).socket_path)
 
     def pid_of(self, program: Literal["guard", "daemon"]) -> int:
-        """Return the process id of a program of the robot."""
+        """Return the process id of a program of the robot.
+
+        Raises:
+            RobotError: If the program does not run at the moment.
+        """
         parent = self.supervisor.pid
         children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
         for pid in children:
@@ -100,7 +111,11 @@ class RunningRobot:
     def await_restart(self) -> dict[str, Any]:
         """Wait until the daemon can be reached, also after a restart.
 
-        Return the "port" of the daemon, and the "fingerprint" of its certificate.
+        Returns:
+            The "port" of the daemon, and the "fingerprint" of its certificate.
+
+        Raises:
+            RobotError: If the daemon does not start in time.
         """
         path = self.folder / _READY
         until_s = time.monotonic() + _READY_S

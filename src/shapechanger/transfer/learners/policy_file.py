@@ -70,7 +70,12 @@ _MOST_ENVS: Final = 4096
 
 @dataclass(frozen=True)
 class Normalisation:
-    """Mean and variance of a policy's observations, and of the discounted return in training."""
+    """Running statistics that normalise a policy's observations, and its rewards in training.
+
+    Attributes:
+        observation: Mean and variance of each observation.
+        reward: Mean and variance of the discounted return.
+    """
 
     observation: RunningMeanStd
     reward: RunningMeanStd
@@ -343,8 +348,16 @@ def convert_zip(
 ) -> TrainedPolicy:
     """Convert a zip of PPO, SAC or TQC. Loading a zip can run code that it contains.
 
-    The layouts of observations and actions, and the identity, belong to the env. Raises
-    SpaceMismatch if the layouts do not fit the policy's spaces.
+    Args:
+        path: A zip that the model's `save` wrote.
+        env: The env that the model was trained in.
+        layouts: Layouts of the env's observations and actions.
+        identity: Identity of the env.
+        command: The command that converts the zip.
+
+    Raises:
+        PolicyError: If the file is missing, not a zip of a model, or of another algorithm.
+        SpaceMismatch: If the layouts do not fit the policy's spaces.
     """
     model = _read_zip(path)
     check_supported(model)

@@ -174,9 +174,14 @@ class VehicleEnv(DriveEnv):
         return f"shapechanger/{self.world.vehicle.name.capitalize()}Ranges-v1"
 
     def taught_by(self, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int) -> Demonstrator:
-        """Return a teacher as the demonstrator of this env; `seed` determines its disturbances.
+        """Return a teacher as the demonstrator of this env.
 
-        `act` is a policy of `teacher_env`: it maps observations, (n, 11), to actions, (n, 2).
+        Args:
+            act: Policy of `teacher_env`: maps observations, (n, 11), to actions, (n, 2).
+            seed: Seed of the demonstrator's random disturbances.
+
+        Raises:
+            ProfileError: If the control rates of the robot and of the teacher differ.
         """
         from shapechanger.vehicles.envs.demonstrators import Demonstrator, require_rate  # SciPy.
 
