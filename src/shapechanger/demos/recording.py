@@ -35,8 +35,17 @@ _QUALITY: Final = 95  # JPEG quality of images that an env returns as arrays, pe
 class ObservationEncoder:
     """Splits the observations of an env into a JPEG and a state.
 
-    Observations are an image, a state, or a Dict of `image` and `state`; `state_layout` is None
-    without a state. An env with other spaces, or without layouts, is refused.
+    Args:
+        env: Env whose observations are an image, a state, or a Dict of `image` and `state`.
+
+    Attributes:
+        action_layout: Meaning of the values of an action.
+        state_layout: Meaning of the values of a state; None without a state.
+        has_picture: Whether observations contain images.
+
+    Raises:
+        DemosError: If a space is of another kind.
+        LayoutError: If the env publishes no layouts.
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
@@ -99,8 +108,8 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
     raises the error; all earlier steps are complete.
 
     Args:
-        env: Its observations are an image, a state, or a Dict of `image` and `state`; it has
-            layouts.
+        env: Env with layouts, whose observations are an image, a state, or a Dict of `image` and
+            `state`.
         recording: Folder of the recording; created if missing.
         driver: Kind of driver that decides the actions passed to `step`.
         about: Further fields of the header, such as `robot`, `body`, `source` and `notes`.
@@ -112,6 +121,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
 
     Raises:
         DemosError: If the env's observations or actions cannot be recorded.
+        LayoutError: If the env publishes no layouts.
     """
 
     def __init__(
@@ -141,15 +151,21 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
     def decide(self, decision: Step) -> None:
         """Set the decision for the next step, if it differs from the action passed to `step`.
 
-        It has the intended `action`, which is to be learned; its `driver`; and the action `wanted`
-        by a policy while another driver drives.
+        Args:
+            decision: The intended `action`, which is to be learned; its `driver`; and the action
+                `wanted` by a policy while another driver drives.
         """
         self._decision = decision
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode, which is written from its first step on; close the previous one."""
+        """Begin an episode, which is created on disk with its first step; close the previous one.
+
+        Args:
+            seed: As in `gymnasium.Env.reset`.
+            options: As in `gymnasium.Env.reset`.
+        """
         self.end()
         observation, info = super().reset(seed=seed, options=options)
         self._see(observation, info)
@@ -236,15 +252,23 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         return observation, reward, terminated, truncated, info
 
     def mark(self, text: str = "") -> None:
-        """Mark the newest step, with free text."""
+        """Mark the newest step, with free text.
+
+        Raises:
+            DemosError: If no episode is being recorded.
+        """
         if self._writer is None:
             raise DemosError("No episode is being recorded: one begins with the first step.")
         self._writer.mark(text)
 
     def end(self, outcome: str = "") -> None:
-        """Close the episode, if one is open, with how it ended.
+        """Close the episode, if one is open; steps until the next reset are not recorded.
 
-        The steps that follow, until the next reset, are not recorded.
+        Args:
+            outcome: How the episode ended; "" if unspecified.
+
+        Raises:
+            OutputError: If the header cannot be written; all steps are on disk nevertheless.
         """
         writer, self._writer = self._writer, None
         self._header = self._decision = None

@@ -67,7 +67,11 @@ _OWN: Final = (tub.FORMAT, minari.FORMAT, lerobot.FORMAT, csv_files.FORMAT, mcap
 
 @cache
 def formats() -> Mapping[str, Format]:
-    """Return all formats, keyed by name: our own, and formats of other packages' entry points."""
+    """Return all formats, keyed by name: our own, and formats of other packages' entry points.
+
+    Raises:
+        DemosError: If an entry point does not name a `Format`, or two formats have the same name.
+    """
     found = {form.name: form for form in _OWN}
     for point in entry_points(group=_GROUP):
         form = point.load()
@@ -80,15 +84,20 @@ def formats() -> Mapping[str, Format]:
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """Result of an import or an export: the format, and numbers of what was written.
+    """Result of an import or an export.
 
-    Findings are parts left out, contradictions in the source, and changes by an export.
+    Attributes:
+        format: Name of the format.
+        episodes: Number of episodes written.
+        steps: Number of steps written.
+        pictures: Number of images written by an import; 0 for an export.
+        findings: Parts left out, contradictions in the source, and changes by an export.
     """
 
     format: str
     episodes: int
     steps: int
-    pictures: int = 0  # Of an import.
+    pictures: int = 0
     findings: tuple[ImportFinding, ...] = ()
 
 
@@ -114,6 +123,8 @@ def export_recording(
     Raises:
         DemosError: If the recording is damaged or does not fit the format, or `out` exists or lies
             in `data`.
+        UnknownName: If there is no such format.
+        OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
     """
     form = formats().get(format)
@@ -227,6 +238,7 @@ def import_episodes(path: Path, context: ImportContext | None = None) -> Iterato
 
     Raises:
         DemosError: If something is damaged or missing, possibly while an episode is iterated.
+        MissingExtra: If a package that the format needs is not installed.
     """
     yield from _read(path, "auto", context or ImportContext(strict=True))[1]
 
@@ -253,6 +265,8 @@ def import_recording(
     Raises:
         DemosError: If `path` has no intact episode, or `strict` is set and a part is damaged, or
             `out` exists or lies in `path`.
+        UnknownName: If there is no such format.
+        OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
     """
     context = ImportContext(camera=camera, hz=hz, strict=strict)
@@ -289,7 +303,12 @@ def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterato
 
 
 def find_format(path: Path) -> str:
-    """Detect the format of a folder; refuse a folder of no known format, or of several."""
+    """Detect the format of a folder.
+
+    Raises:
+        DemosError: If the folder does not exist, or has no known format, or several formats; the
+            error lists them.
+    """
     found = _formats_of(path)
     if len(found) == 1:
         return found[0]

@@ -137,7 +137,13 @@ class ImportFinding(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class ImportContext:
-    """Options of an import, see `import_recording`, and its findings so far."""
+    """Options of an import, and its findings so far.
+
+    Attributes:
+        camera: Name of the camera to import, if there are several; "" for the only one.
+        hz: Steps per second, as stated by the user; None to read or measure the rate.
+        strict: Whether to refuse a source that is incomplete or contradicts itself.
+    """
 
     camera: str = ""
     hz: float | None = None
@@ -147,12 +153,16 @@ class ImportContext:
     )
 
     def report(self, kind: Kind, text: str, name: str = "") -> None:
-        """Add a finding; with `strict`, a warning or a part that is left out is an error.
+        """Add a finding.
 
         Args:
             kind: Kind of the finding.
-            text: A sentence; or with `name`, the reason, with which all such parts are listed.
+            text: A sentence; or with `name`, the reason for that part. Parts with the same reason
+                are listed together.
             name: The part of the source, such as a record; "" if the finding is about all of it.
+
+        Raises:
+            DemosError: If `strict` is set and the kind is not "note".
         """
         names = self._found.setdefault((kind, text), [])
         names += [name] if name else []
@@ -172,12 +182,19 @@ class ImportContext:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportContext:
-    """Options of an export, see `export_recording`; the writer's folder is renamed to `out`."""
+    """Options of an export.
+
+    Attributes:
+        out: The folder that the user asked for; the writer's folder is renamed to it at the end.
+        task: What the robot does, in words; "" if not given.
+        images: Whether to store images as they were recorded, instead of video.
+        rewarded: Whether all steps have a reward.
+    """
 
     out: Path
     task: str = ""
     images: bool = False
-    rewarded: bool = False  # Whether all steps have a reward.
+    rewarded: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

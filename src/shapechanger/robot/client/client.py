@@ -176,8 +176,14 @@ class RobotClient(Inbox):
     def suggest(self, values: Sequence[float], *, answers: int) -> int:
         """Send a suggestion while another client has control; the robot only shows it.
 
-        It has the arguments of `command`, expires like a command, and also requests the next
-        observation. The result is its number, for `refusal`.
+        A suggestion expires like a command, and also requests the next observation.
+
+        Args:
+            values: One number for each action of the robot, in the order of its action layout.
+            answers: `seq` of the observation that the suggestion answers.
+
+        Returns:
+            The number of the suggestion, for `refusal`.
         """
         seq = next(self._numbers)
         self._post(messages.Suggest(seq=seq, answers=answers, values=tuple(map(float, values))))
@@ -194,7 +200,12 @@ class RobotClient(Inbox):
         return self.observation(seq)
 
     def exchange(self, values: Sequence[float], seen: Received) -> Received:
-        """Send a command in answer to the observation `seen`, and wait for the next one."""
+        """Send a command, and wait for the next observation.
+
+        Args:
+            values: One number for each action of the robot, in the order of its action layout.
+            seen: The observation that the command answers.
+        """
         self.command(values, answers=seen.message.seq)
         return self.observation(seen.message.seq)
 
@@ -211,7 +222,11 @@ class RobotClient(Inbox):
         self._post(messages.Release())
 
     def record(self, on: bool = True, name: str = "") -> messages.RecorderState:
-        """Begin or end an episode, with a title, on the robot's disk; only as a person.
+        """Begin or end an episode on the robot's disk; only as a person.
+
+        Args:
+            on: Whether to record.
+            name: Title of the episode; may be empty.
 
         Raises:
             RobotRefused: If the robot cannot record, for example on a full disk, or records
@@ -224,20 +239,27 @@ class RobotClient(Inbox):
         )
 
     def mark(self, text: str = "") -> messages.RecorderState:
-        """Mark the newest step of the episode being recorded; raises as `record`."""
+        """Mark the newest step of the episode being recorded; raises as `record` does."""
         before = self.recorder.marks if self.recorder else 0
         return self._ask(
             messages.Mark(text=text), messages.RecorderState, lambda state: state.marks > before
         )
 
     def undo(self, seconds: float = 5.0) -> messages.RecorderState:
-        """Drop the newest seconds, above 0, of the episode being recorded; raises as `record`."""
+        """Drop the newest steps of the episode being recorded; raises as `record` does.
+
+        Args:
+            seconds: Duration of the steps to drop, s, above 0.
+        """
         before = self.recorder.dropped if self.recorder else 0
         undo = messages.Undo(seconds=seconds)
         return self._ask(undo, messages.RecorderState, lambda state: state.dropped > before)
 
     def browse(self, before: str = "") -> messages.Recordings:
-        """List the episodes on the robot, newest first; only ids that sort before `before`, if any.
+        """List the episodes on the robot, newest first.
+
+        Args:
+            before: Only episodes whose id sorts before this one; "" for the newest.
 
         Raises:
             RobotRefused: If the robot has no folder for recordings.
@@ -245,15 +267,22 @@ class RobotClient(Inbox):
         return self._ask(messages.Browse(before=before), messages.Recordings)
 
     def fetch(self, episode: str, first: int = 0, count: int = 1_000) -> messages.Piece:
-        """Read lines, from 0, of the episode with an id on the robot's disk; raises as `browse`.
+        """Read a part of an episode on the robot's disk; raises as `browse` does.
 
-        Fewer than `count` lines are sent if the message would be too large.
+        Args:
+            episode: Id of the episode.
+            first: Number of the first line, from 0.
+            count: Number of lines; fewer are sent if the message would be too large.
         """
         request = messages.Fetch(episode=episode, first=first, count=count)
         return self._ask(request, messages.Piece)
 
     def ping(self) -> tuple[float, int]:
-        """Return the round-trip time, s, and the robot's time at its answer, ns."""
+        """Measure the round trip.
+
+        Returns:
+            The duration of the round trip, s, and the robot's time at its answer, ns.
+        """
         start = time.monotonic()
         pong = self._ask(messages.Ping(), messages.Pong)
         return time.monotonic() - start, pong.now_ns

@@ -389,10 +389,13 @@ def latencies(
     """Return the measurable delays of a step, s.
 
     The command `seq` was sent at `sent_at`, s, in answer to `answered`, and `received` followed.
-    `capture_to_send` is from the capture of the frame to its sending, by the robot's clock. If the
-    robot acted on this command, there are also `round_trip`: there and back, without the time on
-    the robot, on real clocks only; `observation_age_at_action`: from the capture of the answered
-    frame to the command's arrival; `command_to_pin`: from its arrival to the outputs.
+
+    Returns:
+        `capture_to_send` is the time from the capture of the frame to its sending, by the robot's
+        clock. If the robot acted on this command, there are also `round_trip`: there and back,
+        without the time on the robot, on real clocks only; `observation_age_at_action`: from the
+        capture of the answered frame to the command's arrival; `command_to_pin`: from the command's
+        arrival to the outputs.
     """
     seen = received.message
     known = {"capture_to_send": (seen.sent_ns - seen.captured_ns) / _NS_PER_S}
