@@ -297,7 +297,8 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        healthy_z_range: Least and largest healthy height of the torso, m; None follows the body.
+        healthy_z_range: Least and largest healthy height of the torso, m; None derives them from
+            the body.
         **arguments: All other arguments of `Hopper-v5` and of `Reshapable`.
     """
 
@@ -364,7 +365,8 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        healthy_z_range: Least and largest healthy height of the torso, m; None follows the body.
+        healthy_z_range: Least and largest healthy height of the torso, m; None derives them from
+            the body.
         **arguments: All other arguments of `Walker2d-v5` and of `Reshapable`.
     """
 
@@ -522,7 +524,8 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        healthy_z_range: Least and largest healthy height of the torso, m; None follows the body.
+        healthy_z_range: Least and largest healthy height of the torso, m; None derives them from
+            the body.
         **arguments: All other arguments of `Humanoid-v5` and of `Reshapable`.
     """
 

@@ -84,8 +84,8 @@ class ExchangeRecord:
 
     Attributes:
         step: The step; its index and the name of its frame are ignored.
-        jpeg: JPEG of the step's image, which an import sets from `image`; the same object in
-            successive records that share an image.
+        jpeg: JPEG of the step's image; the same object in successive records that share an image.
+            Readers of formats leave it None, and the import sets it from `image`.
         marks: Texts of the step's marks.
         dropped: Why the step is excluded; None if it is not excluded.
         name: Name of the record in findings.

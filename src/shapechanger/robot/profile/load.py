@@ -23,7 +23,7 @@ CAMERAS: Final = {"ribbon": "picamera2", "usb": "v4l2", "none": ""}
 
 
 def shipped_profiles() -> dict[str, Path]:
-    """Return the profiles that ship with the package, keyed by name."""
+    """Return the files of the profiles that ship with the package, keyed by name."""
     return {path.stem: path for path in sorted(_SHIPPED.glob(f"*{_SUFFIX}"), key=lambda p: p.stem)}
 
 
