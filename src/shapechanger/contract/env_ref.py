@@ -84,7 +84,10 @@ class EnvRef(msgspec.Struct, frozen=True):
 class BodyDraw(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Bodies to draw from a family: the argument `bodies` of an env with many bodies.
 
-    The split is "train", "interpolation", "extrapolation" or "composition".
+    Attributes:
+        split: Part of the family: "train", "interpolation", "extrapolation" or "composition".
+        count: Number of bodies.
+        seed: Seed of the draws.
     """
 
     split: str = "train"
@@ -93,9 +96,16 @@ class BodyDraw(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def each_body(env: EnvRef) -> list[EnvRef]:
-    """Return one env for each body in the argument `bodies` of an env, or else the env itself.
+    """Return one env for each body in the argument `bodies` of an env.
 
-    The argument is a list of bodies as JSON, or a `BodyDraw` as a mapping.
+    Args:
+        env: An env; its argument `bodies` is a list of bodies as JSON, or a `BodyDraw` as a
+            mapping. Without the argument, the result is the env itself.
+
+    Raises:
+        StudyError: If `bodies` is invalid, or the env's body belongs to no family.
+        UnknownName: If there is no such split.
+        MorphologyError: If no bodies can be drawn from the family.
     """
     if "bodies" not in env.kwargs:
         return [env]
@@ -159,12 +169,17 @@ class EnvTraits:
     """Properties of an env, read once per study.
 
     Attributes:
+        observation_layout: Meaning of an observation.
+        action_layout: Meaning of an action.
+        observation_space: Space of observations.
+        action_space: Space of actions.
         exclusive: Whether only one run at a time may use the env, such as a robot.
         individual: Name of the argument that selects one of several robots; may be empty.
         has_demonstrator: Whether the env has an expert for its task.
         adapts_source: Whether the env has `identified_source` and `randomised_source`.
         family: Name of the continuous family of the env's body; may be empty.
         measures: The performance metrics of a policy, the default first.
+        identity: Identity of the env's robot and of its custom files.
     """
 
     observation_layout: Layout
@@ -186,7 +201,15 @@ class EnvTraits:
 
 
 def env_traits(env: gym.Env[Any, Any], env_id: str = "") -> EnvTraits:
-    """Read the traits of an env, whose id may name a module; LayoutError without layouts."""
+    """Read the traits of an env.
+
+    Args:
+        env: The env.
+        env_id: Id of the env, which may name a module.
+
+    Raises:
+        LayoutError: If the env publishes no layouts.
+    """
     observation, action = layouts_of(env)
     inner = env.unwrapped
     return EnvTraits(
@@ -246,7 +269,9 @@ def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
 def certify_shift(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> str:
     """Return the certificate of the change between two envs; empty if the source issues none.
 
-    Raises EmptyShift if nothing changes.
+    Raises:
+        EmptyShift: If nothing changes.
+        StudyError: If an env fails in the rollout that the certificate compares.
     """
     certify = getattr(source.unwrapped, "certify_shift", None)
     if certify is None:

@@ -62,8 +62,9 @@ def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> floa
 class Duty:
     """Conversion of an output value to a duty cycle, the share of time that a motor is on.
 
-    Values just above 0 become `start`, the smallest duty that moves the motor, and 1 becomes
-    `full`: 0 <= start < full <= 1.
+    Attributes:
+        start: Smallest duty that moves the motor, 0 to 1; values just above 0 are mapped to it.
+        full: Duty at a value of 1, above `start` and at most 1.
     """
 
     start: float = 0.0
@@ -151,12 +152,15 @@ class Stall:
 
 
 class Propulsion:
-    """Forward component of the actions; positive is forward."""
+    """Forward component of the actions; positive is forward.
+
+    Attributes:
+        forward: Indices of the actions that push the robot forward or backward.
+    """
 
     def __init__(self, actions: Sequence[ActionPlan]) -> None:
         self._actions = actions
-        # Indices of the actions that push the robot forward or backward. The steering of a tank
-        # propels too, but never forward.
+        # The steering of a tank propels too, but never forward.
         self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != "steering")
         self._rests = [(i, actions[i].rest) for i in self.forward]
         # Indices of the actions for which the profile states a speed.
@@ -178,7 +182,13 @@ class Propulsion:
 
 
 class MotionReflexes:
-    """Reflexes that block motion if the robot touches, approaches or pushes against an object."""
+    """Reflexes that block motion if the robot touches, approaches or pushes against an object.
+
+    Attributes:
+        bump: Contacts of the bumpers.
+        stall: Pushes without motion.
+        propulsion: Forward component of the actions.
+    """
 
     def __init__(self, plan: GuardPlan) -> None:
         self._actions = plan.actions

@@ -77,15 +77,18 @@ class ActionPlan:
 
 @dataclass(frozen=True, slots=True)
 class OutputPlan:
-    """One motor, servo or controller, whose `settings` contain all defaults of its driver.
+    """One motor, servo or controller, with its weight of each action.
 
     Its value is `offset` plus the weighted sum of the actions, clipped to -1 to 1.
 
     Attributes:
+        name: Name, such as "left".
         driver: Name of the driver, such as "hbridge".
         part: The part that the output moves, such as "wheels" or "left track"; may be empty.
         mix: Weight of each action.
         offset: Value if all actions are 0.
+        settings: Settings of the driver, such as pins and pulse widths, with all defaults filled
+            in.
     """
 
     name: str
@@ -98,12 +101,14 @@ class OutputPlan:
 
 @dataclass(frozen=True, slots=True)
 class SensorPlan:
-    """One sensor of the guard, whose `settings` contain all defaults of its driver.
-
-    It measures "speed", "bump", "distance", "imu", "battery", "temperature", "tendons" or "joints".
+    """One sensor of the guard.
 
     Attributes:
+        name: Name, such as "bumper".
         driver: Name of its driver, such as "switch".
+        measures: Measured quantity: "speed", "bump", "distance", "imu", "battery",
+            "temperature", "tendons" or "joints".
+        settings: Settings of the driver, with all defaults filled in.
     """
 
     name: str
@@ -169,7 +174,12 @@ class GuardPlan:
     """Everything that the guard needs.
 
     Attributes:
+        name: Name of the robot.
         actions: The actions of a command, in order.
+        outputs: The outputs that the actions move.
+        sensors: The sensors that the guard reads.
+        limits: Limits beyond which the robot stops by itself.
+        stop: Course of a stop.
         enable_pin: BCM pin that the guard toggles while it runs, for the one-shot circuit that
             keeps the enable line of the motors active; None without it.
         stop_pin: BCM pin of an emergency stop button to ground; None without a button.
@@ -202,7 +212,12 @@ class GuardPlan:
 def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...]:
     """Return the value of each output: its offset plus the weighted sum of the actions, in [-1, 1].
 
-    Raises ValueError if the number of actions is wrong.
+    Args:
+        plan: The robot.
+        actions: One number for each action of the robot, in order.
+
+    Raises:
+        ValueError: If the number of actions is wrong.
     """
     if len(actions) != len(plan.actions):
         names = ", ".join(action.name for action in plan.actions)

@@ -21,7 +21,13 @@ STANDING_RADPS: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Position of a vehicle, m, and its heading from the x axis, rad, counter-clockwise."""
+    """Pose of a vehicle seen from above.
+
+    Attributes:
+        x: Position along the x axis, m.
+        y: Position along the y axis, m.
+        heading: Angle from the x axis, rad, counter-clockwise.
+    """
 
     x: float
     y: float
@@ -33,6 +39,7 @@ class Readings:
     """True values of the quantities that sensors on the vehicle measure.
 
     Attributes:
+        pose: Pose of the vehicle.
         speed: Speed along its heading, m/s; backward is negative.
         travelled_m: Distance that the wheels have rolled, m; it decreases while rolling backward.
         acceleration_x: Acceleration along its heading, m/s2.
@@ -82,9 +89,12 @@ class World(Protocol):
         self.place(0)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Simulate the world for `dt_s` seconds.
+        """Simulate the world for a duration.
 
-        `outputs` has a value from -1 to 1 for each part, such as "wheels"; None without torque.
+        Args:
+            dt_s: Duration, s.
+            outputs: Output of each part, such as "wheels", from -1 to 1; None for a part without
+                torque.
         """
         ...
 
