@@ -152,7 +152,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
         Returns:
             The observations of all worlds, and the infos of those that started again. The
-            observations of others are of their present state.
+                observations of others are of their present state.
 
         Raises:
             VectorEnvError: If there are not as many seeds as worlds, as many bodies as worlds that

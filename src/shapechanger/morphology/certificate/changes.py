@@ -127,7 +127,7 @@ def compare(
 
     Returns:
         The changes: standing height, dimensions and total mass first, then element by element.
-        Empty for models whose elements have the same names and numbers.
+            Empty for models whose elements have the same names and numbers.
     """
     robot: list[_Row] = [("standing height", "robot", *standing_height, "m")]
     one, two = moved_numbers(source), moved_numbers(target)

@@ -392,10 +392,10 @@ def latencies(
 
     Returns:
         `capture_to_send` is the time from the capture of the frame to its sending, by the robot's
-        clock. If the robot acted on this command, there are also `round_trip`: there and back,
-        without the time on the robot, on real clocks only; `observation_age_at_action`: from the
-        capture of the answered frame to the command's arrival; `command_to_pin`: from the command's
-        arrival to the outputs.
+            clock. If the robot acted on this command, there are also `round_trip`: there and back,
+            without the time on the robot, on real clocks only; `observation_age_at_action`: from
+            the capture of the answered frame to the command's arrival; `command_to_pin`: from the
+            command's arrival to the outputs.
     """
     seen = received.message
     known = {"capture_to_send": (seen.sent_ns - seen.captured_ns) / _NS_PER_S}
