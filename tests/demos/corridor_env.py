@@ -36,9 +36,8 @@ class CorridorEnv(gym.Env[Any, NDArray[np.float32]]):
         }
         self.observation_space, features = parts[shows]
         self.observation_layout = Layout(features)
-        self.action_layout = Layout(
-            (Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0))
-        )
+        both = ("steering", "throttle")
+        self.action_layout = Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in both))
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.done: list[list[float]] = []
         self.more: dict[str, Any] = {}
@@ -53,7 +52,6 @@ class CorridorEnv(gym.Env[Any, NDArray[np.float32]]):
         return self._seen(), {**self.more}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Advance by the throttle."""
         self.done.append([float(value) for value in action])
         self._way += 0.1 * float(action[1])
         hit = self._way >= 2.0
@@ -67,7 +65,6 @@ class CorridorEnv(gym.Env[Any, NDArray[np.float32]]):
         return self._seen(), sum(terms.values()), hit, False, info
 
     def demonstrator(self, seed: int) -> "AlwaysForward":
-        """Return an expert."""
         return AlwaysForward()
 
     def _seen(self) -> Any:

@@ -21,9 +21,8 @@ def _jpeg(number: int, width: int = 32, height: int = 24) -> bytes:
 
 def _recorded(recording: Path, steps: int = 6, **changes: Any) -> Path:
     """Record an episode with a new frame at every second step, whose last step is the policy's."""
-    with EpisodeWriter.create(
-        recording, header(**({"image_size": (32, 24)} | changes)), spare_bytes=0
-    ) as writer:
+    about = header(**({"image_size": (32, 24)} | changes))
+    with EpisodeWriter.create(recording, about, spare_bytes=0) as writer:
         for number in range(steps):
             driver = "policy" if number == steps - 1 else "person"
             one = step(number, action=(0.1 * number, 0.5), driver=driver)
@@ -94,17 +93,13 @@ def test_episodes_that_differ_are_not_mixed(
     tmp_path: Path, changes: dict[str, Any], what: str
 ) -> None:
     first, second = _recorded(tmp_path), _recorded(tmp_path, **changes)
-    with pytest.raises(
-        DemosError, match=f"{second} has other {what} than {first}: learn from one kind"
-    ):
+    with pytest.raises(DemosError, match=f"{second} has other {what} than {first}: learn from"):
         load_dataset(tmp_path)
 
 
 def test_a_frame_of_another_size_or_a_truncated_one_is_refused(tmp_path: Path) -> None:
     path = _recorded(tmp_path, image_size=(64, 24))
-    with pytest.raises(
-        DemosError, match=r"000000\.jpg has \(32, 24\) pixels, but the header \(64, 24\)"
-    ):
+    with pytest.raises(DemosError, match=r"\(32, 24\) pixels, but the header \(64, 24\)"):
         load_dataset(path)
     with EpisodeWriter.create(tmp_path / "cut", header(), spare_bytes=0) as writer:
         writer.add(step(0), _jpeg(1)[:-40])

@@ -89,7 +89,9 @@ class Corrected:
         ([0.0] * 16, (1, 3), "p" + 12 * "e" + "ppp"),  # Danger needs no time.
     ],
 )
-def test_who_drives(gaps: list[float], dangers: tuple[int, ...], drivers: str) -> None:
+def test_when_the_expert_takes_over(
+    gaps: list[float], dangers: tuple[int, ...], drivers: str
+) -> None:
     """Steps last 0.1 s: the expert takes over after 0.3 s, and the policy drives on after 1 s."""
     one = Corrected()
     steps = enumerate(gaps)
@@ -107,7 +109,7 @@ def test_the_driver_changes_for_a_reason() -> None:
 
 
 @given(right=st.floats(-1.0, 1.0, width=32), share=st.floats(0.0, 1.0, width=32))
-def test_slower_than_the_expert_is_no_difference(right: float, share: float) -> None:
+def test_a_policy_slower_than_the_expert_is_not_corrected(right: float, share: float) -> None:
     one, slow = Corrected(np.array([0.0, right], np.float32)), (0.1, share * right)
     assert not any(one.decide(slow)[1] for _ in range(10))
     one.decide(slow, danger=True)
@@ -115,7 +117,9 @@ def test_slower_than_the_expert_is_no_difference(right: float, share: float) -> 
 
 
 @pytest.mark.parametrize("wanted", [(0.9, 0.5), (0.0, 1.0 + 0.2), (0.0, -0.7)])
-def test_faster_backward_and_aside_are_corrected(wanted: tuple[float, float]) -> None:
+def test_driving_faster_backward_or_aside_is_corrected(
+    wanted: tuple[float, float],
+) -> None:
     one = Corrected()
     assert "the policy is off by" in [one.decide(wanted)[1] for _ in range(3)][-1]
 

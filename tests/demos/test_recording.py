@@ -46,7 +46,6 @@ def drive(env: gym.Env[Any, Any], steps: int, seed: int | None = None) -> None:
 
 
 def only(recording: Path) -> Episode:
-    """Return the only episode."""
     (path,) = episodes_of(recording)
     return read_episode(path)
 
@@ -228,14 +227,11 @@ def test_an_env_that_fails_leaves_a_closed_episode(tmp_path: Path) -> None:
             with pytest.raises(error):
                 drive(env, 3)
     episodes = [read_episode(path) for path in episodes_of(tmp_path)]
-    assert [(e.closed, e.outcome, len(e.steps)) for e in episodes] == [
-        (True, "stopped", 2),
-        (True, "failed", 2),
-    ]
+    found = [(e.closed, e.outcome, len(e.steps)) for e in episodes]
+    assert found == [(True, "stopped", 2), (True, "failed", 2)]
 
 
 def test_unsuitable_envs_are_refused(tmp_path: Path) -> None:
-    """Invalid observations and missing layouts raise errors."""
     with pytest.raises(LayoutError, match="CartPole-v1 publishes no observation_layout"):
         RecordEpisodes(gym.make("CartPole-v1"), tmp_path)
     sound = gym.spaces.Dict({"sound": gym.spaces.Box(-1.0, 1.0, (2,))})

@@ -25,7 +25,7 @@ from shapechanger.demos.report import distributions, recording_html
 from tests.demos.episodes.making import ACTIONS, header, recorded, step
 
 
-def test_the_numbers_of_a_recording_are_of_kept_steps(tmp_path: Path) -> None:
+def test_statistics_and_the_page_count_only_kept_steps(tmp_path: Path) -> None:
     speeds = [-1.0, -0.01, 0.0, 0.01, 0.02, 1.0, 1.0, 7.0]
     with EpisodeWriter.create(tmp_path, header(env="x/Car-v1"), spare_bytes=0) as writer:
         for number, speed in enumerate(speeds):
@@ -64,20 +64,13 @@ def test_the_numbers_of_a_recording_are_of_kept_steps(tmp_path: Path) -> None:
 
 
 def episode_with(times_ns: Sequence[int | None], hz: float) -> Episode:
-    """Return an episode whose steps have these times."""
     steps = [step(n, captured_ns=ns, decided_ns=None, index=n) for n, ns in enumerate(times_ns)]
     return Episode(Path(), header(control_hz=hz), tuple(steps), (), (), closed=True, outcome="")
 
 
 @settings(max_examples=50, deadline=None)
-@given(
-    hz=st.floats(1.0, 100.0),
-    spread_by=st.floats(0.0, 0.2),
-    pauses_s=st.lists(st.floats(31.0, 1e5), max_size=3),
-)
-def test_durations_are_those_of_the_times(
-    hz: float, spread_by: float, pauses_s: list[float]
-) -> None:
+@given(st.floats(1.0, 100.0), st.floats(0.0, 0.2), st.lists(st.floats(31.0, 1e5), max_size=3))
+def test_durations_leave_out_pauses(hz: float, spread_by: float, pauses_s: list[float]) -> None:
     rng = np.random.default_rng(1)
     periods_s = (1 + rng.uniform(-spread_by, spread_by, 40)) / hz
     parts = [periods_s[n * 10 : (n + 1) * 10] for n in range(len(pauses_s) + 1)]

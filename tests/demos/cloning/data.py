@@ -13,9 +13,8 @@ from shapechanger.demos.dataset import Dataset
 from shapechanger.layout import Feature, Layout
 from shapechanger.policy import CloneNetwork, Framing, PolicyCard
 
-KEYS: Final = Layout(
-    tuple(Feature(name, "1", 0.0, 1.0) for name in ("forward", "backward", "right", "left"))
-)
+_KEYS = ("forward", "backward", "right", "left")
+KEYS: Final = Layout(tuple(Feature(name, "1", 0.0, 1.0) for name in _KEYS))
 STEERS: Final = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
 STATE: Final = Layout(
     (Feature("distance", "m"), Feature("speed", "m/s"), Feature("steering/applied", "1", -1.0, 1.0))
@@ -53,16 +52,16 @@ def clone_card(
     )
 
 
-def stripes(n: int, seed: int, layout: Layout = KEYS, size: tuple[int, int] = (33, 50)) -> Dataset:
+def stripes(n: int, seed: int, layout: Layout = KEYS) -> Dataset:
     """Return dark noise with a stripe on the left, in the middle or on the right.
 
     The side sets the steering. The first state feature holds it too; the last equals the action.
     """
     rng = np.random.default_rng(seed)
     side = rng.integers(-1, 2, n)
-    pictures = rng.integers(0, 60, (n, *size, 3), np.uint8)
+    pictures = rng.integers(0, 60, (n, 33, 50, 3), np.uint8)
     for picture, where in zip(pictures, side, strict=True):
-        middle = round(size[1] * (0.5 + 0.3 * where))
+        middle = round(50 * (0.5 + 0.3 * where))
         picture[:, middle - 4 : middle + 4] += 150
     if layout == KEYS:
         actions = np.zeros((n, 4), np.float32)

@@ -13,12 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.clone import targets
-from shapechanger.demos.cloning.evaluation import (
-    AskedHead,
-    evaluate,
-    output_fields,
-    tercile_classes,
-)
+from shapechanger.demos.cloning.evaluation import evaluate, output_fields, tercile_classes
 from shapechanger.demos.cloning.learn import best_temperature, learn
 from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.errors import DemosError
@@ -29,7 +24,6 @@ from tests.demos.cloning.data import KEYS, QUICK, STEERS, clone_card, stripes
 
 @pytest.fixture(scope="module")
 def keys() -> CameraPolicy:
-    """A policy that chooses among keys."""
     return learn(stripes(120, 0), settings=QUICK, seed=0)[0]
 
 
@@ -53,15 +47,11 @@ def test_the_metrics_are_consistent(keys: CameraPolicy) -> None:
         evaluate(keys, data.part(np.zeros(60, np.bool_)))
 
 
-def test_regression_is_correct_in_the_same_third() -> None:
+def test_actions_are_classed_by_the_third_of_their_range() -> None:
     actions = np.array([[-1.0, 1.0], [-0.4, 0.4], [0.2, 0.0], [0.4, -0.9]])
     names, numbers = tercile_classes(actions, STEERS, actions)
-    assert [names[i] for i in numbers] == [
-        "left forward",
-        "left forward",
-        "straight still",
-        "right back",
-    ]
+    found = [names[i] for i in numbers]
+    assert found == ["left forward", "left forward", "straight still", "right back"]
 
 
 class Answers:
@@ -81,9 +71,8 @@ class Answers:
 
 def scores(done: NDArray[np.float64], wanted: NDArray[np.float64], layout: Layout) -> list[float]:
     """Return all metrics of outputs; larger values are better."""
-    data = dataclasses.replace(
-        stripes(len(wanted), 0), actions=wanted, pictures=None, action_layout=layout
-    )
+    shown = stripes(len(wanted), 0, layout)
+    data = dataclasses.replace(shown, actions=wanted, pictures=None)
     report = evaluate(Answers(done), data)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
     return [report.accuracy, report.within, report.macro_f1, *(-np.array(report.errors))]
 
@@ -141,15 +130,12 @@ def _keys(text: str) -> np.ndarray:
     return held
 
 
-def _card(
-    actions: np.ndarray, layout: Layout, asked: AskedHead, mirrored: np.ndarray | None = None
-) -> CloneNetwork:
-    fields = output_fields(actions, layout, asked, mirrored)
-    return clone_card(layout, **fields).network
+def _card(actions: np.ndarray, layout: Layout) -> CloneNetwork:
+    return clone_card(layout, **output_fields(actions, layout, "auto")).network
 
 
 def test_keys_become_classes_with_names() -> None:
-    card = _card(_keys("FFFFFFFFFFLLLLLLNNNN"), KEYS, "auto")
+    card = _card(_keys("FFFFFFFFFFLLLLLLNNNN"), KEYS)
     assert card.class_names == ("forward", "left", "none")
     assert targets(card, _keys("LFNB")).tolist() == [1, 0, 2, -1]
 
@@ -157,7 +143,7 @@ def test_keys_become_classes_with_names() -> None:
 def test_numbers_are_scaled_by_their_layout() -> None:
     layout = Layout((Feature("a", "N", 0.0, 10.0), Feature("b", "m"), Feature("c", "m")))
     actions = np.stack([np.linspace(2, 8, 50), np.linspace(-3, 5, 50), np.ones(50)], axis=1)
-    card = _card(actions.astype(np.float32), layout, "auto")
+    card = _card(actions.astype(np.float32), layout)
     assert (card.classes, card.low, card.high[:2]) == ((), (0.0, -3.0, 1.0), (10.0, 5.0))
     np.testing.assert_allclose(targets(card, actions[:1]), [[-0.6, -1.0, -1.0]], atol=1e-6)
 

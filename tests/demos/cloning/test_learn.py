@@ -13,13 +13,14 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.clone import CloneSettings
+from shapechanger.demos.cloning.clone import Augmentation, CloneSettings
 from shapechanger.demos.cloning.evaluation import evaluate
 from shapechanger.demos.cloning.learn import Inputs, Training, learn
 from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.dataset import Dataset
 from shapechanger.errors import DemosError, PolicyError
 from shapechanger.layout import Feature, Layout
+from shapechanger.policy import Framing
 from tests.demos.cloning.data import KEYS, QUICK, SMALL, STEERS, corridor, error, stripes
 
 _FEW = msgspec.structs.replace(QUICK, fewest_steps=5, most_steps=5)
@@ -30,7 +31,6 @@ Cloned = tuple[CameraPolicy, Training]
 
 @pytest.fixture(scope="module")
 def keys() -> Cloned:
-    """A policy that learned which key is held."""
     return learn(stripes(200, 0), settings=QUICK, seed=3)
 
 
@@ -99,9 +99,7 @@ def test_a_layout_without_a_mirror_is_not_mirrored(symmetric: bool) -> None:
     data = replace(stripes(60, 0), action_layout=odd)
     policy, training = learn(data, settings=_FEW, symmetric=symmetric)
     assert policy.card.settings.augmentation.mirror == 0.0
-    assert training.mirror_note == (
-        "No image is mirrored, because the mirror image of joint_0/angle is unknown."
-    )
+    assert "because the mirror image of joint_0/angle is unknown" in training.mirror_note
 
 
 def test_the_same_seed_gives_the_same_policy() -> None:
@@ -154,7 +152,7 @@ def test_rehearsal_prevents_forgetting(driver: Cloned) -> None:
     source, target = corridor(100, 1), corridor(60, 3, gain=-1.0)
     settings = msgspec.structs.replace(SMALL, rehearsal=0.5, fewest_steps=40, most_steps=40)
     forgets, keeps = (
-        _cloned(target, settings, driver[0], rehearsal=rehearsal)[0] for rehearsal in (None, source)
+        _cloned(target, settings, driver[0], rehearsal=old)[0] for old in (None, source)
     )
     old = corridor(200, 2)
     assert error(keeps, old) < 0.9 * error(forgets, old)
@@ -200,16 +198,16 @@ def test_invalid_data_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("kind", "wrong"),
     [
-        {"channels": ()},
-        {"batch": 0},
-        {"most_steps": 10},
-        {"learning_rate": 0.0},
-        {"held_out": 1.0},
-        {"weight_decay": -1.0},
+        (CloneSettings, {"channels": (), "batch": 0, "most_steps": 10, "learning_rate": 0.0}),
+        (CloneSettings, {"held_out": 1.0, "weight_decay": -1.0}),
+        (Augmentation, {"mirror": 1.5, "noisy": -0.1, "shift": -1, "noise": -1.0, "gain": 0.5}),
+        (Framing, {"height": 0, "width": -1, "top": 1.0}),
+        (Framing, {"top": float("nan")}),
     ],
 )
-def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(DemosError):
-        CloneSettings(**wrong)  # pyright: ignore[reportArgumentType]
+def test_invalid_settings_are_refused(kind: Any, wrong: dict[str, float]) -> None:
+    for name, value in wrong.items():
+        with pytest.raises((DemosError, PolicyError)):
+            kind(**{name: value})

@@ -31,9 +31,8 @@ class _World(gym.Env[Any, Any]):
         felt = gym.spaces.Box(-np.inf, np.inf, (3,), np.float32)
         both = gym.spaces.Dict({"image": seen, "state": felt})
         self.observation_space = {"picture": seen, "state": felt, "both": both}[inputs]
-        self.action_space = gym.spaces.Box(
-            layout.low.astype(np.float32), layout.high.astype(np.float32)
-        )
+        low, high = (limits.astype(np.float32) for limits in (layout.low, layout.high))
+        self.action_space = gym.spaces.Box(low, high)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -60,12 +59,6 @@ def _policy(layout: Layout, inputs: Inputs = "picture") -> CameraPolicy:
     return learn(stripes(60, 0, layout), settings=_SHORT, inputs=inputs)[0]
 
 
-def _done(policy: CameraPolicy, inputs: Inputs, data: Any) -> np.ndarray:
-    return policy.predict_many(
-        None if inputs == "state" else data.pictures, None if inputs == "picture" else data.states
-    )
-
-
 @pytest.mark.parametrize("inputs", ["picture", "state", "both"])
 @pytest.mark.parametrize("kind", [SAC, PPO])
 def test_a_model_predicts_like_the_clone_and_learns(
@@ -81,7 +74,7 @@ def test_a_model_predicts_like_the_clone_and_learns(
     model = kind.load(tmp_path / "model.zip", env=_World(STEERS, inputs))
     assert (model.gamma, model.batch_size) == (0.9, 8)
     raw = _observations(data, inputs, slice(None))
-    expected = _done(policy, inputs, data)
+    expected = policy.act(raw)
     np.testing.assert_allclose(model.predict(raw, deterministic=True)[0], expected, atol=2e-4)
     one = _observations(data, inputs, slice(0, 1), squeeze=True)
     np.testing.assert_allclose(model.predict(one, deterministic=True)[0], expected[0], atol=2e-4)
@@ -99,13 +92,10 @@ def test_ppo_chooses_the_classes_of_a_clone(tmp_path: Path) -> None:
     env = gym.wrappers.TransformAction(_World(KEYS, "picture"), classes.__getitem__, space)
     model = PPO.load(tmp_path / "ppo.zip", env=env)
     chosen = model.predict(data.pictures, deterministic=True)[0]
-    np.testing.assert_array_equal(
-        np.asarray(policy.net.classes)[chosen], policy.predict_many(data.pictures)
-    )
+    np.testing.assert_array_equal(classes[chosen], policy.predict_many(data.pictures))
     model.learn(16)
 
 
-def test_sac_refuses_classes() -> None:
-    """The error names PPO."""
+def test_sac_refuses_classes_and_names_ppo() -> None:
     with pytest.raises(PolicyError, match="use PPO"):
         as_sac(_policy(KEYS), _SIZE)

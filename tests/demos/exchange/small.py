@@ -40,7 +40,6 @@ def picture(seed: int, width: int = 40, height: int = 32, *, grey: bool = False)
 
 
 def image_file(pixels: np.ndarray, kind: str = "PNG", mode: str | None = None) -> bytes:
-    """Return an image as a file of the given kind."""
     file = io.BytesIO()
     Image.fromarray(pixels).convert(mode).save(file, kind)
     return file.getvalue()
@@ -150,12 +149,10 @@ def read_whole(
 
 
 def findings_of(found: ImportContext | Converted) -> str:
-    """Return all findings as text, one per line."""
     return "\n".join(f"{kind}: {text}" for kind, text in found.findings)
 
 
 def all_of(data: Path) -> list[Episode]:
-    """Return the episodes of a recording."""
     return [read_episode(path) for path in episodes_of(data)]
 
 
@@ -176,9 +173,5 @@ def content_of(episode: Episode) -> dict[str, Any]:
 
 
 def snapshot(folder: Path) -> dict[str, bytes]:
-    """Return the bytes of every file below a folder."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}

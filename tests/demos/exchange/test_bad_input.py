@@ -54,7 +54,6 @@ def _edit(name: str, change: Callable[[bytes], bytes]) -> Callable[[Path], None]
 
 
 def _exported(place: Path, name: str) -> Path:
-    """Export a drive."""
     drive(place / "recorded")
     export_recording(place / "recorded", place / "out-v0", name)
     return place / "out-v0"
@@ -80,32 +79,21 @@ FALSE = b"false,false"
 @pytest.mark.parametrize(
     ("own", "spoil", "expected"),
     [
-        (
-            False,
-            lambda f: (f / "2.jpg").unlink(),
-            "line 3 of keys: an image that cannot be read (No such file or directory)",
-        ),
+        (False, lambda f: (f / "2.jpg").unlink(), "line 3 of keys: an image that cannot be read"),
         (False, _edit("2.jpg", lambda jpeg: huge()), "line 3 of keys: a damaged image"),
         (False, _edit("2.jpg", lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"), "line 3 of keys: it is invalid"),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,nan,0.0,1.0"), "line 3 of keys: its action is"),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,,1.0"), "its action has 3 values"),
-        (False, _table(b"0.0,0.0,0.0,1.0", b",,,"), "missing required field `action`"),
         (False, _table(b"\n2.jpg", b"\n../2.jpg"), "leaves the folder"),
         (False, _table(b"\n3.jpg", b"\n1.jpg"), "returns to the image '1.jpg'"),
         (False, _table(b"1499144070.2", b"soon"), "captured_ns is not a time: 'soon'"),
-        (False, _table(b"1499144070.2", b"9e999999"), "captured_ns is not a time"),
         (False, _link_away, "leaves the folder"),
         (True, _table(b"000001.jpg", b"../1.jpg"), "leaves the folder"),
         (True, _table(FALSE + b",,,\n4", b"maybe,false,,,\n4"), "`bool`, got `str`"),
-        (True, _table(FALSE + b",,,\n4", b",false,,,\n4"), "line 5 of out-v0: it is invalid"),
         (True, _table(b"\n3,", b"\n2,"), "step 2 is not after the step before"),
         (True, _table(b"\n3,", b"\n3,x\n3.5,"), "2 cells instead of"),
-        (
-            True,
-            _edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)),
-            "8 x 8 pixels instead of 40",
-        ),
+        (True, _edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)), "8 x 8 pixels instead"),
     ],
 )
 def test_damaged_lines_of_csv(
@@ -156,10 +144,6 @@ def _frameless(file: h5py.File) -> None:
     file["episode_0/infos/frame"] = ["x"] * 5
 
 
-def _short(file: h5py.File) -> None:
-    file["episode_0/actions"].resize(2, axis=0)
-
-
 def _spoilt(file: h5py.File) -> None:
     file["episode_0/observations/image"][1] = np.frombuffer(picture(1)[:-200], np.uint8)
 
@@ -173,22 +157,14 @@ def _with_rest(text: str) -> Callable[[Path], None]:
     ("form", "spoil", "expected"),
     [
         ("keys", _table(b"file", b"\xff"), "is not text in UTF-8"),
-        (
-            "keys",
-            _edit("steps.csv", lambda t: b""),
-            "has neither a header.json nor a column action/NAME",
-        ),
+        ("keys", _edit("steps.csv", lambda t: b""), "has neither a header.json nor a column"),
         ("keys", _edit("steps.csv", lambda t: t.splitlines(True)[0]), "There is nothing to import"),
         ("keys", _edit("steps.csv", lambda t: t + b'"open'), "is not valid CSV"),
         ("keys", _table(b"backward", b"forward"), "two columns of one name"),
         ("csv", _edit("header.json", lambda t: t[:40]), "not valid JSON"),
         ("csv", _swap("header.json", b'"format": 1', b'"format": 9'), "format 9"),
         ("csv", _swap("header.json", b'"unit"', b'"u"'), "missing required field `unit`"),
-        (
-            "csv",
-            _edit("header.json", lambda t: re.sub(rb"\[\s+40,\s+32\s+]", b"null", t)),
-            "images",
-        ),
+        ("csv", _edit("header.json", lambda t: re.sub(rb"\[\s+40,\s+32\s+]", b"null", t)), "image"),
         ("csv", _table(b"action/steering", b"steer"), "action/steering, steer"),
         ("csv", _table(b"terminated,truncated", b"truncated,terminated"), "their order"),
         ("csv", _table(b"person", b"persona"), "Invalid enum value 'persona'"),
@@ -200,11 +176,9 @@ def _with_rest(text: str) -> Callable[[Path], None]:
         ("minari", _edit("data/main_data.hdf5", lambda b: b[:3000]), "is not an intact HDF5 file"),
         ("minari", _edit("data/metadata.json", lambda b: b[:3000]), "not valid JSON"),
         ("minari", _swap("data/metadata.json", b'"hdf5"', b'"arrow"'), "'arrow'"),
-        ("minari", _in_file(lambda f: f.__delitem__("episode_0/rewards")), "has no 'rewards'"),
         ("minari", _in_file(_frameless), "infos/step of step 0 of episode_0 is damaged: "),
         ("minari", _in_file(_leads_away), "has no 'actions' that is an array in this file"),
         ("minari", _swap("data/main_data.hdf5", b"SNOD", b"XXXX"), "not an intact"),
-        ("minari", _in_file(_short), "has 2 entries for 5 steps"),
         ("minari", _in_file(_spoilt), "a damaged image"),
     ],
 )
@@ -233,8 +207,7 @@ def test_folders_of_unknown_format(tmp_path: Path) -> None:
     assert import_recording(tub, out, "csv").steps == 1
 
 
-def test_unknown_formats(tmp_path: Path) -> None:
-    """The error suggests the nearest format, on import and export."""
+def test_the_nearest_format_is_suggested(tmp_path: Path) -> None:
     keys_folder(tmp_path / "keys")
     assert "Did you mean 'minari'" in refused(tmp_path / "keys", tmp_path / "data", "minary")
     assert "is not tub" in refused(tmp_path / "keys", tmp_path / "data", "tub")
@@ -283,18 +256,14 @@ def test_episodes_of_two_kinds(tmp_path: Path, changes: dict[str, object], expec
     ],
 )
 def test_frames_that_minari_cannot_read(tmp_path: Path, jpeg: bytes, expected: str) -> None:
-    steps = [
-        (Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0)), data)
-        for data in (picture(0), jpeg)
-    ]
-    record(tmp_path / "data", header(), steps)
+    step = Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0))
+    record(tmp_path / "data", header(), [(step, picture(0)), (step, jpeg)])
     with pytest.raises(DemosError, match=expected):
         export_recording(tmp_path / "data", tmp_path / "out-v0", "minari")
     assert [path.name for path in tmp_path.iterdir()] == ["data"]
 
 
-def test_nothing_to_export(tmp_path: Path) -> None:
-    """A recording without steps, and one with neither images nor states, are refused."""
+def test_exports_without_steps_or_with_unknown_options_are_refused(tmp_path: Path) -> None:
     record(tmp_path / "data", header(), [])
     with pytest.raises(DemosError, match="nothing to export"):
         export_recording(tmp_path / "data", tmp_path / "csv", "csv")

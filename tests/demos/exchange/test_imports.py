@@ -35,7 +35,7 @@ from tests.demos.exchange.small import (
 )
 
 
-def test_a_table_of_others(tmp_path: Path) -> None:
+def test_a_csv_table_of_another_program(tmp_path: Path) -> None:
     folder = keys_folder(tmp_path / "keys")
     before = snapshot(folder)
     assert find_format(folder) == "csv"
@@ -57,7 +57,7 @@ def test_a_table_of_others(tmp_path: Path) -> None:
     assert snapshot(folder) == before
 
 
-def test_a_table_of_others_with_states(tmp_path: Path) -> None:
+def test_a_csv_table_with_states_and_semicolons(tmp_path: Path) -> None:
     (tmp_path / "table").mkdir()
     (tmp_path / "table/steps.csv").write_text(
         "Angle;throttle;state/speed;lap;done\n0.5;1;2.25;7;0\n-1;0;nan;8;1\noops;0;1;8;0\n0,5;0;1;8;0\n"
@@ -146,21 +146,19 @@ def test_minari_loads_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     for n, pixels in enumerate(episode.observations["image"][:-1]):
         np.testing.assert_array_equal(pixels, simplejpeg.decode_jpeg(picture(n)))
     assert len(episode.observations["image"]) == len(episode.observations["state"]) == 6
-    np.testing.assert_array_equal(
-        episode.observations["state"][:-1], [(n / 7, math.nan) for n in range(5)]
-    )
+    states = episode.observations["state"][:-1]
+    np.testing.assert_array_equal(states, [(n / 7, math.nan) for n in range(5)])
     np.testing.assert_array_equal(episode.actions, [(0.1 * n, 1 / 3) for n in range(5)])
     assert episode.truncations.tolist() == [False] * 4 + [True]
-    rests = [json.loads(text) for text in episode.infos["step"]]
-    assert [rest["step"]["driver"] for rest in rests] == ["person"] * 5
+    drivers = [json.loads(text)["step"]["driver"] for text in episode.infos["step"]]
+    assert drivers == ["person"] * 5
     assert dataset.observation_space["image"].contains(episode.observations["image"][0])
 
 
 @pytest.mark.parametrize("jpeg", [True, False])
-def test_images_of_other_minari_datasets(
+def test_images_of_a_dataset_that_minari_wrote(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jpeg: bool
 ) -> None:
-    """Datasets that Minari itself wrote."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     pixels = np.zeros((3, 40, 48, 3), np.uint8)
     pixels[:, :, :, 0] = np.arange(48) * 5
@@ -203,7 +201,7 @@ def test_images_of_other_minari_datasets(
             assert stored == bytes(file["episode_0/observations/camera"][0])
 
 
-def test_a_source_that_is_not_whole_is_refused_or_collected(tmp_path: Path) -> None:
+def test_an_incomplete_source_is_refused_or_its_faults_are_collected(tmp_path: Path) -> None:
     records = [r | {"_timestamp_ms": 1000 + 50 * n} for n, r in enumerate(_RECORDS[:3] * 4)]
     folder = tub_folder(tmp_path / "tub", records)
     (folder / "images/4_cam_image_array_.jpg").write_bytes(b"")

@@ -8,23 +8,13 @@ from typing import Any
 
 import av
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shapechanger.demos.exchange import video
-from tests.demos.exchange.lerobot_set import (
-    CAMERA,
-    DATA,
-    EPISODES,
-    SIZE,
-    VIDEO,
-    pairs_of,
-    write_set,
-    write_video,
-)
+from tests.demos.exchange.lerobot_set import CAMERA, DATA, SIZE, VIDEO, pairs_of, write_set
 from tests.demos.exchange.small import findings_of
 
 BOTH = [[(n, n) for n in range(8)], [(n, n) for n in range(8, 16)]]
@@ -67,11 +57,7 @@ def test_pictures_are_found_by_their_time(
 
 
 @settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    lost=st.sets(st.integers(0, 15), max_size=6),
-    rate=st.sampled_from([1, 2, 3]),
-    key=st.sampled_from([1, 5, 250]),
-)
+@given(st.sets(st.integers(0, 15), max_size=6), st.integers(1, 3), st.sampled_from([1, 5, 250]))
 def test_no_lost_picture_shifts_the_others(
     tmp_path_factory: pytest.TempPathFactory, lost: set[int], rate: int, key: int
 ) -> None:
@@ -103,7 +89,6 @@ def place(number: int, **changes: Any) -> Any:
 
 
 def row(number: int, **changes: Any) -> Any:
-    """Return a change of a row."""
     return lambda rows: rows[number].update(changes)
 
 
@@ -116,25 +101,13 @@ def every(change: Any) -> Any:
     ("options", "episodes", "reason"),
     [
         # Changes of the video.
-        (
-            {"options": ["-use_editlist", "0", "-bf", "2"]},
-            [],
-            "shows 0.1 to 0.9 s where meta/episodes says 0 to 0.8 s",
-        ),
+        ({"options": ["-use_editlist", "0", "-bf", "2"]}, [], "says 0 to 0.8 s"),
         ({"options": ["-output_ts_offset", "0.5"]}, [], "shows 0.5 to 1.3 s where"),
         # After a lost image, the later images are shifted, so all episodes are left out.
         ({"pictures": [*range(5), *range(6, 16)]}, [], "shows 0 to 0.75 s where"),
         ({"places": place(0, to_timestamp=0.35)}, [1], "lacks an image at the time"),
-        (
-            {"places": place(1, from_timestamp=0.35)},
-            [],
-            "episode 0, episode 1: Parts of .* overlap",
-        ),
-        (
-            {"places": place(1, from_timestamp=0.42, to_timestamp=0.82)},
-            [0],
-            "lacks an image at the time",
-        ),
+        ({"places": place(1, from_timestamp=0.35)}, [], "episode 1: Parts of .* overlap"),
+        ({"places": place(1, from_timestamp=0.42, to_timestamp=0.82)}, [0], "lacks an image at"),
         ({"video_fps": 10, "pictures": range(8)}, [], "lacks an image at the time"),
         # Changes of the keys.
         *(
@@ -173,12 +146,8 @@ def test_contradictions_are_left_out(
 @pytest.mark.parametrize(
     ("options", "warning"),
     [
-        (
-            {"info": {"total_episodes": 3}},
-            r"has \(3, 16\) episodes and steps, and meta/episodes \(2, 16\)",
-        ),
+        ({"info": {"total_episodes": 3}}, r"\(3, 16\) .*, and meta/episodes \(2, 16\)"),
         ({"pictures": range(18)}, r"more images: .* shows 0 to 0\.9 s where"),
-        ({"info": {"total_frames": 15}}, r"has \(2, 15\) episodes and steps"),
     ],
 )
 def test_contradictions_that_change_no_step_are_reported(
@@ -210,7 +179,6 @@ def test_no_damage_shifts_the_pictures(
 
 
 def cut(content: bytearray) -> None:
-    """Remove the end of a video."""
     del content[-40:]
 
 
@@ -263,22 +231,6 @@ def test_a_video_of_too_many_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     pairs, context = pairs_of(folder)
     assert not pairs
     assert "is damaged" in findings_of(context)
-
-
-def test_one_damaged_file_of_several(tmp_path: Path) -> None:
-    folder = write_set(tmp_path / "set")
-    entries = pq.read_table(folder / EPISODES).to_pylist()
-    second = VIDEO.replace("file-000", "file-001")
-    entries[1] |= {f"videos/{CAMERA}/file_index": 1}
-    entries[1] |= {f"videos/{CAMERA}/from_timestamp": 0.0, f"videos/{CAMERA}/to_timestamp": 0.4}
-    pq.write_table(pa.Table.from_pylist(entries), folder / EPISODES)
-    write_video(folder / VIDEO, range(8), 20)
-    (folder / second).write_bytes(b"nothing")
-    pairs, context = pairs_of(folder)
-    assert pairs == BOTH[:1]
-    write_video(folder / second, range(8, 16), 20)
-    assert pairs_of(folder)[0] == BOTH
-    assert "file-001.mp4 is damaged" in findings_of(context)
 
 
 def test_rows_are_found_in_other_files_than_stated(tmp_path: Path) -> None:

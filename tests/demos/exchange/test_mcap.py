@@ -21,7 +21,6 @@ Message = tuple[str, int, dict[str, Any]]
 
 
 def messages(path: Path) -> list[Message]:
-    """Return the topic, time and content of each message."""
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         return [
@@ -31,7 +30,6 @@ def messages(path: Path) -> list[Message]:
 
 
 def of(found: list[Message], topic: str) -> list[tuple[int, dict[str, Any]]]:
-    """Return the times and contents of one topic."""
     return [(at, content) for name, at, content in found if name == topic]
 
 
@@ -39,6 +37,7 @@ def of(found: list[Message], topic: str) -> list[tuple[int, dict[str, Any]]]:
 def exported(tmp_path: Path) -> Path:
     """Export an episode with all fields of a step."""
     layout = Layout((Feature("speed", "m/s", 0.0, 4.0), Feature("map", "1", shape=(2,))))
+    rest: dict[str, Any] = {"action": (0.0, 0.0), "driver": "person"}
     steps = [
         Step(
             action=(0.5, -1 / 3),
@@ -52,13 +51,10 @@ def exported(tmp_path: Path) -> Path:
             terms={"speed": 2.0, "ü": math.nan},
         ),
         Step(action=(0.0, 0.0), driver="policy", wanted=(0.1, 0.2), state=(2.0, 3.0, 4.0)),
-        Step(
-            action=(0.0, 0.0), driver="person", state=(1.0,) * 3, terminated=True, stop_reason="x"
-        ),
+        Step(**rest, state=(1.0,) * 3, terminated=True, stop_reason="x"),
     ]
-    with EpisodeWriter.create(
-        tmp_path / "data", header(state_layout=layout, control_hz=10.0)
-    ) as writer:
+    about = header(state_layout=layout, control_hz=10.0)
+    with EpisodeWriter.create(tmp_path / "data", about) as writer:
         for n, step in enumerate(steps):
             writer.add(step, None if n == 1 else picture(n))
         writer.mark("here")
@@ -86,19 +82,15 @@ def test_every_value_is_there(exported: Path) -> None:
     terms = {"speed": 2.0, "ü": None}
     assert of(found, "/reward") == [(start + 4, {"reward": 1.5, "terms": terms})]
     plain = {"terminated": False, "truncated": False}
+    end = {"stop_reason": "x", "marks": ["here"]}
     assert [content for _, content in of(found, "/step")] == [
         {"step": 0, "driver": "person", **plain, "wall_ns": 1_700_000_000_000_000_001},
         {"step": 1, "driver": "policy", **plain, "dropped": "bad"},
-        {
-            **{"step": 2, "driver": "person", "terminated": True, "truncated": False},
-            **{"stop_reason": "x", "marks": ["here"]},
-        },
+        plain | {"step": 2, "driver": "person", "terminated": True} | end,
     ]
     pictures = of(found, "/camera")
-    assert [base64.b64decode(content["data"]) for _, content in pictures] == [
-        picture(0),
-        picture(2),
-    ]
+    jpegs = [base64.b64decode(content["data"]) for _, content in pictures]
+    assert jpegs == [picture(0), picture(2)]
     assert pictures[0][1]["timestamp"] == {"sec": 7, "nsec": 5}
     assert {content["format"] for _, content in pictures} == {"jpeg"}
 
@@ -115,9 +107,8 @@ def test_every_value_is_there(exported: Path) -> None:
 def test_unknown_times_fit_the_known_ones(
     tmp_path: Path, clock_ns: list[int | None], expected_ns: list[int]
 ) -> None:
-    with EpisodeWriter.create(
-        tmp_path / "data", header(state_layout=Layout(()), image_size=None, control_hz=10.0)
-    ) as writer:
+    about = header(state_layout=Layout(()), image_size=None, control_hz=10.0)
+    with EpisodeWriter.create(tmp_path / "data", about) as writer:
         for n, at in enumerate(clock_ns):
             at_ns = None if at is None else at * 10**6
             writer.add(Step(action=(n / 10, 0.0), driver="person", captured_ns=at_ns), None)

@@ -82,23 +82,17 @@ def removed(name: str) -> Callable[[h5py.File], object]:
 
 
 def resized(length: int) -> Callable[[h5py.File], object]:
-    """Return a change of the number of actions of the second episode."""
     return lambda file: file["episode_1/actions"].resize(length, axis=0)
 
 
 def endless(file: h5py.File) -> None:
-    """Make an action of the second episode infinite."""
     file["episode_1/actions"][2] = np.inf
 
 
 @pytest.mark.parametrize(
     ("change", "expected", "finding"),
     [
-        (
-            removed("actions"),
-            BOTH[:1],
-            "left out: episode_1 of main_data.hdf5: episode_1 has no 'actions'",
-        ),
+        (removed("actions"), BOTH[:1], "left out: episode_1 of main_data.hdf5: .* no 'actions'"),
         (removed("rewards"), BOTH[:1], "has no 'rewards'"),
         (resized(5), BOTH[:1], "actions' has 5 entries for 4 steps"),
         (resized(3), BOTH[:1], "actions' has 3 entries for"),

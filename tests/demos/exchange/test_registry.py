@@ -71,8 +71,9 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 
 
 @pytest.mark.usefixtures("installed")
-def test_a_format_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The commands detect, read and write a format that another package registers."""
+def test_commands_use_a_registered_format(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     source = tmp_path / "drive"
     source.mkdir()
     (source / "speeds.txt").write_text("0.5\n1.5\nfast\n")
@@ -91,7 +92,7 @@ def test_a_format_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert (again / "speeds.txt").read_text() == "0.5\n1.5"
 
 
-def test_a_format_of_a_name_that_is_taken(installed: Path) -> None:
+def test_two_formats_of_one_name_are_refused(installed: Path) -> None:
     path = installed / "speeds_format.py"
     path.write_text(path.read_text().replace('name="speeds"', 'name="csv"'))
     with pytest.raises(DemosError, match="must name a Format of another name than tub, minari"):

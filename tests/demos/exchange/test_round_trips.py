@@ -33,6 +33,8 @@ _ANY = st.floats(width=64)
 _FINITE = st.floats(allow_nan=False, allow_infinity=False)
 _PAIRS = st.tuples(_ANY, _ANY)
 _TIMES = st.none() | st.integers(0, 2**62)
+_BEGUN = 10**18
+_MS = 10**6
 
 
 @st.composite
@@ -81,12 +83,8 @@ def _headers(draw: st.DrawFn) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("image", "state", "grey"),
-    [
-        ((40, 32), True, False),
-        ((40, 32), False, False),
-        (None, True, False),
-        ((40, 32), True, True),
-    ],
+    [((40, 32), *other) for other in ((True, False), (False, False), (True, True))]
+    + [(None, True, False)],
 )
 @pytest.mark.parametrize("name", ["csv", "minari"])
 @settings(max_examples=3, suppress_health_check=list(HealthCheck))
@@ -138,16 +136,14 @@ def test_many_episodes_keep_their_order(
 
 def test_a_tub_round_trips(tmp_path: Path) -> None:
     """Actions, drivers, policy outputs, states, images and times are kept."""
+    first: dict[str, Any] = {"action": (-0.5, 1.0), "wall_ns": _BEGUN}
+    second: dict[str, Any] = {"action": (0.75, 0.0), "wall_ns": _BEGUN + 100 * _MS}
     steps = [
-        (Step(action=(-0.5, 1.0), driver="person", state=(0.1, math.nan), wanted=(0.25, 0.5)), 0),
-        (Step(action=(0.75, 0.0), driver="policy", state=(1 / 3, 20.0)), 1),
+        Step(driver="person", state=(0.1, math.nan), wanted=(0.25, 0.5), **first),
+        Step(driver="policy", state=(1 / 3, 20.0), **second),
     ]
     what = header(control_hz=10.0, body="car", clock="none", driver="", notes={})
-    made = [
-        (Step(**{**{f: getattr(s, f) for f in s.__slots__}, "wall_ns": 10**18 + n * 10**8}), n)
-        for s, n in steps
-    ]
-    record(tmp_path / "data", what, [(s, picture(n)) for s, n in made])
+    record(tmp_path / "data", what, [(step, picture(n)) for n, step in enumerate(steps)])
     export_recording(tmp_path / "data", tmp_path / "tub", "tub")
     import_recording(tmp_path / "tub", tmp_path / "back")
     (before,), (after,) = all_of(tmp_path / "data"), all_of(tmp_path / "back")
@@ -193,10 +189,6 @@ def test_steps_that_do_not_follow_each_other_are_separate_episodes(
     assert after_s == [0.0, 0.1, 7.32]
 
 
-_BEGUN = 10**18
-_MS = 10**6
-
-
 @pytest.mark.parametrize(
     ("clock", "captured_ns", "wall_ns"),
     [
@@ -214,18 +206,11 @@ def test_times_of_a_tub_ascend_at_the_rate(
     tmp_path: Path, clock: Any, captured_ns: list[int | None], wall_ns: list[int | None]
 ) -> None:
     """A simulated drive has the times of its own clock, and unknown times follow the rate."""
+    still: dict[str, Any] = {"action": (0.0, 0.5), "driver": "expert", "state": (0.0, 20.0)}
+    times = zip(captured_ns, wall_ns, strict=True)
     made = [
-        (
-            Step(
-                action=(0.0, 0.5),
-                driver="expert",
-                state=(0.0, 20.0),
-                captured_ns=captured,
-                wall_ns=wall,
-            ),
-            picture(n),
-        )
-        for n, (captured, wall) in enumerate(zip(captured_ns, wall_ns, strict=True))
+        (Step(**still, captured_ns=captured, wall_ns=wall), picture(n))
+        for n, (captured, wall) in enumerate(times)
     ]
     record(tmp_path / "data", header(clock=clock, control_hz=20.0), made)
     export_recording(tmp_path / "data", tmp_path / "tub", "tub")

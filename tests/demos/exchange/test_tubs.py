@@ -45,12 +45,7 @@ def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Converted]:
 
 
 @settings(max_examples=15, deadline=None)
-@given(
-    first=st.integers(0, 50),
-    count=st.integers(2, 12),
-    chosen=st.data(),
-    per_catalog=st.integers(1, 6),
-)
+@given(st.integers(0, 50), st.integers(2, 12), st.data(), st.integers(1, 6))
 def test_deletions_refer_to_the_index(
     tmp_path_factory: pytest.TempPathFactory,
     first: int,
@@ -58,7 +53,7 @@ def test_deletions_refer_to_the_index(
     chosen: st.DataObject,
     per_catalog: int,
 ) -> None:
-    """Deletions refer to the `_index` of records, also if catalogs were removed."""
+    """Catalogs before the first index were removed."""
     kept = chosen.draw(st.integers(first, first + count - 1))
     indexes = st.integers(first, first + count - 1)
     deleted = chosen.draw(st.sets(indexes.filter(lambda n: n != kept)))
@@ -145,11 +140,7 @@ def in_manifest(old: str, new: str) -> Callable[[Path], object]:
         (lines(lambda ls: [*ls, bytes(512)]), "line 7: damaged JSON", set()),
         (lines(lambda ls: [*ls[:-1], ls[-1][:-9]]), "catalog_0.catalog, line 6", {5}),
         (lines(lambda ls: [*ls, ls[4]]), "record 4: the _index of several records", {4}),
-        (
-            field("_index", "x"),
-            "line 1, catalog_0.catalog, line 5: damaged JSON, or no valid _index",
-            {0, 4},
-        ),
+        (field("_index", "x"), "line 5: damaged JSON, or no valid _index", {0, 4}),
         (field("user/angle", 1.5), "(Expected `float` <= 1.0 - at `$.user/angle`)", {0, 4}),
         (field("pilot/angle", math.nan), "invalid value (Expected `float` >= -1.0", {0, 4}),
         (field("_timestamp_ms", "soon"), "got `str` - at `$._timestamp_ms`)", {0, 4}),
@@ -162,11 +153,7 @@ def in_manifest(old: str, new: str) -> Callable[[Path], object]:
             "record 0, record 1, record 4: the image of several records",
             {0, 1, 4},
         ),
-        (
-            lambda f: (f / "catalog_1.catalog").unlink(),
-            "catalog_1.catalog: There is no",
-            {6, 7, 8, 9},
-        ),
+        (lambda f: (f / "catalog_1.catalog").unlink(), "1.catalog: There is no", {6, 7, 8, 9}),
         (in_manifest("catalog_1", "../catalog_1"), "leaves the folder", {6, 7, 8, 9}),
     ],
 )
@@ -309,10 +296,9 @@ def test_cameras_of_other_names(tmp_path: Path) -> None:
     names = {"cam/left": "{}_left.jpg", "cam/right": "{}_right.jpg"}
     for count in (1, 2):
         cameras = list(names)[:count]
-        made = [
-            r | {name: names[name].format(r["_index"]) for name in cameras}
-            for r in records(3, **NO_IMAGE)
-        ]
+        made = records(3, **NO_IMAGE)
+        for record in made:
+            record |= {name: names[name].format(record["_index"]) for name in cameras}
         inputs = dict.fromkeys(cameras, "image_array")
         folder = tub_folder(tmp_path / f"tub{count}", made, inputs=inputs)
         for n in range(3):
