@@ -32,7 +32,6 @@ class _Policy:
 
 
 def _ends(act: Any, env: str, episodes: int, **arguments: Any) -> list[dict[str, Any]]:
-    """Return the last info of each episode."""
     infos: list[dict[str, Any]] = []
     with gym.make(env, **arguments) as made:
         for i in range(episodes):

@@ -25,9 +25,8 @@ def test_no_complete_step_is_lost_to_sigkill(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "tests.demos.episodes.recorder", str(tmp_path)]
     kept_in_all = 0
     pipe = subprocess.PIPE
-    with subprocess.Popen(
-        command, cwd=_ROOT, stdin=pipe, stdout=pipe, stderr=pipe, bufsize=0
-    ) as runner:
+    pipes = {"stdin": pipe, "stdout": pipe, "stderr": pipe}
+    with subprocess.Popen(command, cwd=_ROOT, bufsize=0, **pipes) as runner:
         assert runner.stdin is not None
         assert runner.stdout is not None
         assert runner.stderr is not None

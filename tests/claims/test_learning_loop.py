@@ -15,8 +15,7 @@ from shapechanger.policy import load_policy
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_corrections_improve_the_policy(tmp_path: Path) -> None:
-    """Training on the corrections reduces the error on all data."""
+def test_training_on_corrections_reduces_the_error(tmp_path: Path) -> None:
     shown, corrected, both = (str(tmp_path / name) for name in ("shown", "corrected", "both"))
     first, second = (str(tmp_path / name) for name in ("first.safetensors", "second.safetensors"))
     drive = ["demos", "record", "Car", "--minutes", "0.5", "--episode-s", "10", "--put-back"]
@@ -28,9 +27,8 @@ def test_corrections_improve_the_policy(tmp_path: Path) -> None:
     main(["demos", "merge", shown, corrected, "--out", both])
     main(["demos", "train", both, "--out", second, "--held-out", "0"])
 
-    drivers = {
-        step.driver for path in episodes_of(Path(corrected)) for step in read_episode(path).steps
-    }
+    recorded = map(read_episode, episodes_of(Path(corrected)))
+    drivers = {step.driver for episode in recorded for step in episode.steps}
     assert {"policy", "expert"} <= drivers
     data = load_dataset(Path(both))
     assert data.pictures is not None

@@ -83,12 +83,10 @@ def _edited(name: str) -> mujoco.MjModel:
 
 @pytest.mark.parametrize("name", _RELEASED)
 def test_edits_make_the_bodies_of_the_release(name: str) -> None:
-    """All arrays of the compiled models are equal bit for bit."""
     assert differing(mujoco.MjModel.from_xml_string(_RELEASED[name]), _edited(name)) == []
 
 
 def test_every_named_body_is_compared() -> None:
-    """Each body of a family has its model of the release here."""
     assert {*ANT.bodies, *PENDULUM.bodies} == {*_RELEASED}
 
 
@@ -100,5 +98,4 @@ def test_every_named_body_is_compared() -> None:
     ],
 )
 def test_masses_of_the_ants(name: str, kilograms: float) -> None:
-    """The total masses equal the documented ones."""
     assert _edited(name).body_mass.sum() == pytest.approx(kilograms, abs=5e-4)

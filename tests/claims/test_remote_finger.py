@@ -32,12 +32,8 @@ def rig() -> Iterator[RunningRobot]:
 
 def _access(robot: RunningRobot) -> dict[str, Any]:
     known = robot.known
-    return {
-        "robot": known.address,
-        "key": known.key,
-        "fingerprint": known.fingerprint,
-        "twin_folder": str(robot.folder),
-    }
+    access = {"robot": known.address, "key": known.key, "fingerprint": known.fingerprint}
+    return access | {"twin_folder": str(robot.folder)}
 
 
 def _env(robot: RunningRobot, **options: Any) -> Env:
@@ -46,7 +42,6 @@ def _env(robot: RunningRobot, **options: Any) -> Env:
 
 @pytest.fixture
 def env(rig: RunningRobot) -> Iterator[Env]:
-    """The rig's env."""
     made = _env(rig)
     yield made
     made.close()

@@ -27,13 +27,11 @@ DRIVE = (*[(0.0, 1.0)] * 15, *[(1.0, 0.5)] * 10, *[(-1.0, -0.5)] * 10, *[(0.0, 0
 
 @pytest.fixture(scope="module")
 def profile(tmp_path_factory: pytest.TempPathFactory) -> Profile:
-    """The car with all sensors."""
     return write_profile(tmp_path_factory.mktemp("profile"))
 
 
 @pytest.fixture(scope="module")
 def robot(profile: Profile) -> Iterator[RunningRobot]:
-    """A car on the twin's clock."""
     with run_robot(profile, clock="twin", arguments=IN_A_ROOM) as running:
         yield running
 

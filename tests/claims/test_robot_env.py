@@ -17,7 +17,6 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 
 def env_of(robot: RunningRobot) -> gym.Env[Any, Any]:
-    """Make the env of a robot, in lockstep."""
     known = robot.known
     access = {"robot": known.address, "key": known.key, "fingerprint": known.fingerprint}
     return gym.make("shapechanger/RemoteVehicle-v1", pace="lockstep", **access)

@@ -44,7 +44,6 @@ def variables(tmp_path: Path) -> dict[str, str]:
 def test_heavy_packages_are_not_installed(
     program: Path, variables: dict[str, str], tmp_path: Path
 ) -> None:
-    """Simulators, learning and plotting packages are missing."""
     names = ", ".join(repr(name) for name in SPARED)
     code = f"import importlib.util as u; print([n for n in ({names},) if u.find_spec(n)])"
     found = subprocess.run(

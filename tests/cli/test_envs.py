@@ -51,9 +51,7 @@ class Bracketed(gym.Env[np.ndarray, np.ndarray]):
 
     observation_space = gym.spaces.Box(-1.0, 1.0, (1,))
     action_space = gym.spaces.Box(-1.0, 1.0, (1,))
-    observation_layout = Layout(
-        [Feature("[/x]", "m", -1.0, 1.0, element=Element("body", "a/b[c]"))]
-    )
+    observation_layout = Layout([Feature("[/x]", "m", element=Element("body", "a/b[c]"))])
     action_layout = Layout([Feature("[red]a", ":ant:", -1.0, 1.0)])
     body = ("[/y]",)
 

@@ -175,13 +175,11 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
         assert "no name of a repository" in refused(run("policies", "pull", name, "--out", out))
     hub.repositories["models/ada/other"] = Repository()
     hub.repositories["models/ada/other"].commit({"model.bin": b"1"})
-    assert "did not push, such as model.bin" in refused(
-        run("policies", "push", POLICY, "ada/other")
-    )
-    assert "has no shapechanger.json" in refused(run("policies", "pull", "ada/other", "--out", out))
-    assert "no such revision" in refused(
-        run("policies", "pull", "ada/other", "--out", out, "--revision", "v9")
-    )
+    other = run("policies", "push", POLICY, "ada/other")
+    assert "did not push, such as model.bin" in refused(other)
+    pull = ("policies", "pull", "ada/other", "--out", out)
+    assert "has no shapechanger.json" in refused(run(*pull))
+    assert "no such revision" in refused(run(*pull, "--revision", "v9"))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -246,9 +244,8 @@ def test_a_pull_that_is_too_large_or_interrupted_leaves_nothing(
     pull = ("demos", "pull", "ada/drive", "--out", tmp_path / "out", "--max-gib", "1e-9")
     assert "more than the limit of 1" in refused(run(*pull))
     assert not any("episodes" in request for request in hub.requests)
-    hub.stalled.update(
-        name for name in hub.repositories["datasets/ada/drive"].files if name.endswith(".jsonl")
-    )
+    names = hub.repositories["datasets/ada/drive"].files
+    hub.stalled.update(name for name in names if name.endswith(".jsonl"))
     before = {path.name for path in tmp_path.iterdir()}
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM, "demos", "pull", "ada/drive", "--out", "out"],

@@ -145,9 +145,8 @@ def test_an_exported_policy_evaluates_the_same(trained: Path, cli: Cli) -> None:
     cli.output("policies", "export", trained, "--out", exported)
     short = ("--episodes", 2)
     for env in ([], ["--env", "BigInvertedPendulum"]):
-        one, other = (
-            cli.output("policies", "evaluate", f, *short, *env) for f in (trained, exported)
-        )
+        both = (trained, exported)
+        one, other = (cli.output("policies", "evaluate", file, *short, *env) for file in both)
         assert one == other
         assert one.startswith("return ")
         assert "steps" in one
@@ -183,19 +182,12 @@ def test_a_policy_of_a_users_learner_is_evaluated_if_the_learner_is_named(
     assert "length" in cli.output(*evaluate, *own)
 
 
-_TINY = [
-    "n_envs=3",
-    "n_steps=16",
-    "batch_size=48",
-    "n_epochs=1",
-    "eval_every=48",
-    "eval_episodes=1",
-]
+_TINY = ["n_envs=3", "n_steps=16", "batch_size=48", "n_epochs=1", "eval_every=48"]
+_TINY += ["eval_episodes=1"]
 
 
 @pytest.fixture(scope="module")
 def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A policy of three ants that has hardly learned."""
     out = tmp_path_factory.mktemp("policies") / "ants.safetensors"
     main(["train", "Ant", "--bodies", "3", "--steps", "48", "--set", *_TINY, "--out", str(out)])
     return out

@@ -43,7 +43,6 @@ def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
         ("\nseeds = 'many'\n", "line 2: Expected `int`, got `str`"),
         ("envs = [", "is not valid TOML"),
         ("envs = ['Ant']\nsources = ['Ant']\ntargets = ['BigAnt']\n", "in one way"),
-        ("sources = ['Ant']\n", "in one way"),
         ("envs = ['Ant',\n'Bigant', 'Hopper']\n", "mine.toml, line 2: No env"),
         ("pairs = [['Ant', {env = 'Ant', body = 'BigAnt'}], ['Ant', 'Ant']]", "called Ant-to-Ant"),
         (

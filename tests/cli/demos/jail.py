@@ -35,7 +35,6 @@ DISK = 64 << 20
 
 
 def limited(arguments: list[str]) -> int:
-    """Run a command within the limits, and return its exit code."""
     mapped = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     for limit, most in (
         (resource.RLIMIT_AS, mapped + MEMORY),

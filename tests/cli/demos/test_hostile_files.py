@@ -100,6 +100,10 @@ def added(line: dict[str, Any] | bytes) -> Callable[[Path], None]:
     return change
 
 
+def nested_in(name: str) -> Callable[[Path], object]:
+    return lambda folder: (folder / name).write_text("[" * 100_000)
+
+
 def nested(depth: int = 100_000) -> bytes:
     body = b'{"kind":' + b"[" * depth + b"]" * depth
     return body + b',"crc":"%08x"}\n' % binascii.crc32(body)
@@ -154,7 +158,7 @@ EPISODES: Spoilt = {
             sparse(e / "frames/000001.jpg", 8 * GIB),
         ),
         "an image elsewhere": steps_with(frame=["../../../secret.jpg", 6, "0"]),
-        "a header nested deeply": lambda e: (e / "episode.json").write_bytes(b"[" * 100_000),
+        "a header nested deeply": nested_in("episode.json"),
         "a step nested deeply": added(nested()),
         "a layout of 10^12 values": header_with(action_layout=LAYOUT),
         "a rate of nothing": header_with(control_hz=1e-320),
@@ -213,10 +217,7 @@ TUBS: Spoilt = {
     ),
     "a catalog of 8 GiB": (lambda f: sparse(f / "catalog_0.catalog", 8 * GIB), "the limit"),
     "a catalog that is a pipe": (lambda f: pipe(f / "catalog_0.catalog"), "There is no"),
-    "a catalog nested deeply": (
-        lambda f: (f / "catalog_0.catalog").write_text("[" * 100_000),
-        "damaged JSON",
-    ),
+    "a catalog nested deeply": (nested_in("catalog_0.catalog"), "damaged JSON"),
 }
 
 
@@ -256,33 +257,21 @@ LEROBOTS: Spoilt = {
         column(PLACES, "tasks", lambda n: [["x" * (96 << 20)], *[["x"]] * (n - 1)]),
         "bytes, but claims",
     ),
-    "a task of 8 MiB": (
-        column(PLACES, "tasks", lambda n: [["x" * (8 << 20)]] * n),
-        "`str` of length <= 4096",
-    ),
+    "a task of 8 MiB": (column(PLACES, "tasks", lambda n: [["x" * (8 << 20)]] * n), "<= 4096"),
     "an image of 128 MiB": (
         column(ROWS, CAMERA, lambda n: [{"bytes": bytes((n == 0) << 27)} for n in range(n)]),
         "bytes, but claims",
     ),
-    "two images of 15 MiB in all rows": (
-        column(ROWS, CAMERA, two_pictures),
-        "far more bytes than its files",
-    ),
+    "two images of 15 MiB in all rows": (column(ROWS, CAMERA, two_pictures), "far more bytes"),
     "a million rows": (many_rows, "bytes, but claims"),
-    "an episode twice": (
-        column(PLACES, "episode_index", lambda n: [0] * n),
-        "does not have each episode once",
-    ),
+    "an episode twice": (column(PLACES, "episode_index", lambda n: [0] * n), "each episode once"),
     "an action of 10^9 values": (
         lambda f: edit(f / "meta/info.json", "2\n            ],", "1000000000\n            ],"),
         "no numeric feature 'action'",
     ),
     "rows that are a pipe": (lambda f: pipe(f / ROWS), "There is no"),
     "metadata of 8 GiB": (lambda f: sparse(f / PLACES, 8 * GIB), "not an intact Parquet file"),
-    "metadata nested deeply": (
-        lambda f: (f / "meta/info.json").write_text("[" * 100_000),
-        "not valid JSON",
-    ),
+    "metadata nested deeply": (nested_in("meta/info.json"), "not valid JSON"),
 }
 
 
@@ -343,10 +332,6 @@ DATASETS: Spoilt = {
 }
 
 
-def a_drive(folder: Path) -> Path:
-    return drive(folder)
-
-
 def a_tub(folder: Path) -> Path:
     records = [{"user/angle": 0.0, "user/throttle": 0.1, "_timestamp_ms": 50 * n} for n in range(4)]
     return tub_folder(folder, records)
@@ -368,9 +353,9 @@ def a_minari_dataset(folder: Path) -> Path:
 
 
 HOSTILE = (
-    (a_drive, EPISODES, ("merge", "--out", "out")),
-    (a_drive, PICTURES, ("export", "--out", "out-v0", "--to", "minari")),
-    (a_drive, EPISODES | PICTURES, ("train", "--out", "policy.safetensors")),
+    (drive, EPISODES, ("merge", "--out", "out")),
+    (drive, PICTURES, ("export", "--out", "out-v0", "--to", "minari")),
+    (drive, EPISODES | PICTURES, ("train", "--out", "policy.safetensors")),
     (a_tub, TUBS, ("import", "--out", "out", "--strict")),
     (a_lerobot_dataset, LEROBOTS, ("import", "--out", "out")),
     (a_minari_dataset, DATASETS, ("import", "--out", "out")),

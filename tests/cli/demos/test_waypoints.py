@@ -27,19 +27,13 @@ from shapechanger.vehicles.envs import WaypointEnv
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT, SteeringResponse, as_waypoints
 
 _ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
-_STATE = Layout(
-    (
-        Feature("speed", "m/s"),
-        Feature("yaw_rate", "rad/s"),
-        Feature("steering/applied", "1", -1.0, 1.0),
-    )
-)
+_MOTION = (Feature("speed", "m/s"), Feature("yaw_rate", "rad/s"))
+_STATE = Layout((*_MOTION, Feature("steering/applied", "1", -1.0, 1.0)))
 _PER_METRE = 1.9
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Change the settings so that training takes seconds."""
     settings = LEARNERS["waypoint"]
     assert isinstance(settings, CloningSettings)
     few = {"fewest_steps": 10, "most_steps": 10, "warm_up": 1, "checks": 1, "batch": 16}
@@ -65,11 +59,8 @@ def _record(folder: Path, n: int = 60, *, state: Layout | None = _STATE, **chang
             stands = number < 10
             steering = 0.1 * (number // 6 % 9 - 4)
             speed = 0.0 if stands else 1.5
-            motion = {
-                "speed": speed,
-                "yaw_rate": -steering * _PER_METRE * speed,
-                "steering/applied": steering,
-            }
+            motion = {"speed": speed, "yaw_rate": -steering * _PER_METRE * speed}
+            motion["steering/applied"] = steering
             picture = rng.integers(0, 255, (120, 160, 3), np.uint8)
             writer.add(
                 Step(
@@ -167,10 +158,7 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
         ({"camera_fovy_deg": 0.0}, "above 0 and below 180, got 0 and 0"),
         ({"camera_fovy_deg": 20.0}, "misses"),
         ({"action_layout": ACTION_LAYOUT}, "omit --waypoints"),
-        (
-            {"action_layout": Layout((Feature("left", "1"), Feature("right", "1")))},
-            "have the actions left, right",
-        ),
+        ({"action_layout": Layout((Feature("left", "1"), Feature("right", "1")))}, "left, right"),
     ],
 )
 def test_unsuitable_recordings_are_refused(

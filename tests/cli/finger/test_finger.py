@@ -91,12 +91,8 @@ def test_a_finger_is_exported(tmp_path: Path, finger: Cli) -> None:
     drawn = GAPS["real-like"].draw(np.random.default_rng(3))
     file.write_text(drawn.to_json())
     texts = []
-    for words in (
-        ("--gap", "real-like", "--finger-seed", 3),
-        ("--parameters", file),
-        (),
-        ("--parameters", "an-1983"),
-    ):
+    gap, named = ("--gap", "real-like", "--finger-seed", 3), ("--parameters", "an-1983")
+    for words in (gap, ("--parameters", file), (), named):
         assert f"wrote {out}" in finger.output("export", "--out", out, *words)
         texts.append(out.read_text())
     drive = drive_of("impedance", NOMINAL)

@@ -63,8 +63,6 @@ def test_the_pitch_is_measured_from_a_horizon(profile: Path, tmp_path: Path, cli
         ("test-car.toml", "--picture wall.jpg", "does not state pitch_deg and fovy_deg"),
         ("lab-car", "--fovy 50", "comes with Shapechanger"),
         ("test-car.toml", "--picture text.jpg", "is not a JPEG"),
-        ("test-car.toml", "--picture none.jpg", "Cannot read none.jpg"),
-        ("test-car.toml", "--picture noise.jpg", "noise.jpg is not a JPEG, or is damaged"),
         ("test-car.toml", "--picture bomb.jpg", "more than 16777216"),
         ("test-car.toml", "--picture sparse.jpg", "Cannot read sparse.jpg: it has"),
         ("test-car.toml", "--picture pipe.jpg", "it is not a regular file"),
@@ -77,7 +75,6 @@ def test_unsuitable_options_and_images_are_refused(
     before = profile.read_bytes()
     _jpeg(tmp_path / "wall.jpg", np.full((120, 160, 3), 90, np.uint8))
     (tmp_path / "text.jpg").write_bytes(b"no picture")
-    (tmp_path / "noise.jpg").write_bytes(b"\xff\xd8\xff" + bytes(100))
     (tmp_path / "bomb.jpg").write_bytes(huge())
     with (tmp_path / "sparse.jpg").open("wb") as file:
         file.truncate(1 << 33)

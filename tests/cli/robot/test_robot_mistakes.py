@@ -23,9 +23,8 @@ from tests.robots import CAR, IN_A_ROOM, changed, write_profile
 
 pytestmark = pytest.mark.realtime
 
-WITHOUT_PINS = pytest.mark.skipif(
-    any(Path("/dev").glob("gpiochip*")), reason="This machine has pins."
-)
+PINS = list(Path("/dev").glob("gpiochip*"))
+WITHOUT_PINS = pytest.mark.skipif(bool(PINS), reason="This machine has pins.")
 KEY = "F3KI-CLDB-JQNI-LWGB-LOBU-SJPT-5E"
 
 
@@ -68,7 +67,6 @@ TWINS = (
 )
 MISTAKES = (
     ("init nocar", "No kind of robot matches 'nocar'"),
-    ("init car --name ../up", "name"),
     ("init", "Name the kind of the new robot"),
     ("serve nocar", "No profile matches 'nocar'. Did you mean 'car'?"),
     ("serve nowhere.toml", "There is no file nowhere.toml"),
@@ -85,13 +83,11 @@ MISTAKES = (
     ("serve test-car.toml --twin --port 0 --lens nihgt", "Did you mean 'night'?"),
     ("serve cat --twin --port 0 --world corridor", "there is no cat in MuJoCo"),
     ("serve car --twin --port 0 --world harbour", "A car does not float"),
-    ("serve lab-boat --twin --port 0 --world yard", "A boat floats: it cannot drive in a yard"),
     ("serve finger --twin --port 0 --finger-seed 3", "--finger-seed needs --gap"),
     ("serve finger --twin --port 0 --gap real-lik", "Did you mean 'real-like'?"),
     ("serve finger --twin --port 0 --gap wide --world room", "Give --gap or --world, not both"),
     ("serve test-car.toml --twin --port 0 --gap wide", "--gap must be used with a finger"),
     ("serve test-car.toml --twin --seed -1", "A seed must be a whole number from 0 to"),
-    (f"serve finger --twin --gap wide --finger-seed {2**32}", "A seed must be a whole number"),
     ("check test-car.toml", "lift its wheels"),
     ("check test-car.toml --cap 0", "--cap must be above 0"),
     ("check test-car.toml --wiring --cap 0.5", "--cap needs a check that drives"),
@@ -99,15 +95,12 @@ MISTAKES = (
     ("check test-car.toml --faults --leds", "Choose one of --leds and --faults"),
     ("check test-car.toml --yes", "--yes needs --leds"),
     ("check test-car.toml --twin --leds --probe 20", "A twin needs no --probe"),
-    ("check test-car.toml --leds --probe 22", "Pin 22 is used by drive forward"),
     ("check test-car.toml --leds --probe 40", "GPIO0 to GPIO27, got 40"),
     ("check finger --twin --leds", "which LEDs cannot replace"),
     ("check finger --faults", "there is nothing to stop"),
-    ("check test-car.toml --leds --twin --trials 3", "--trials needs --faults"),
     ("check test-car.toml --no-one-shot", "--no-one-shot needs --faults"),
     ("check test-car.toml --twin --jumper 20 21", "--jumper cannot be combined with --twin"),
     ("check test-car.toml --leds --wheels-up", "--wheels-up cannot be combined with --twin"),
-    ("check test-car.toml --wheels-up --jumper 20 28", "GPIO0 to GPIO27, got 28"),
     ("check test-car.toml --wheels-up --jumper 20 20", "A jumper joins two pins"),
     ("install car", "`shapechanger robot init car` writes your own"),
     ("home finger", "`shapechanger robot init finger` writes your own"),
@@ -121,7 +114,6 @@ MISTAKES = (
     ("key test-car --credentials nowhere", "nowhere/key does not exist"),
     ("stop nobody", "No known robot matches 'nobody'"),
     ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),
-    ("remember one 127.0.0.1:99999 --fingerprint insecure", "a port from 1 to 65535"),
     ("remember ../one 127.0.0.1 --fingerprint insecure", "robot's name has up to 64"),
     ("find --seconds 0", "must be above 0 and at most 60"),
 )

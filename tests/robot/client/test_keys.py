@@ -82,6 +82,8 @@ UNKNOWN = (
 
 W_FOR_1_S = [("w", 0.033 * n) for n in range(31)]
 LAST_S = W_FOR_1_S[-1][1]
+A_FOR_2_S = [("a", LAST_S + 0.03 * n) for n in range(1, 60)]
+EXPIRED_S = 0.5 + 1.2 * REPEAT_HOLD_S
 JUST = 1e-6
 
 
@@ -108,19 +110,9 @@ def test_direction_keys_move_their_action(key: str, meaning: tuple[str, float]) 
         ([("w", 0.0), ("s", 0.1)], 0.1, -1.0, 0.0),
         # A held key continues when another one is pressed, which does not extend its hold.
         ([*W_FOR_1_S, ("a", LAST_S + 0.02)], LAST_S + FIRST_HOLD_S, 1.0, -1.0),
-        (
-            [*W_FOR_1_S, *(("a", LAST_S + 0.03 * n) for n in range(1, 60))],
-            LAST_S + FIRST_HOLD_S + JUST,
-            0.0,
-            -1.0,
-        ),
+        ([*W_FOR_1_S, *A_FOR_2_S], LAST_S + FIRST_HOLD_S + JUST, 0.0, -1.0),
         # Another key does not revive an expired one.
-        (
-            [("w", 0.0), ("w", 0.5), ("a", 0.5 + 1.2 * REPEAT_HOLD_S)],
-            0.5 + 1.2 * REPEAT_HOLD_S,
-            0.0,
-            -1.0,
-        ),
+        ([("w", 0.0), ("w", 0.5), ("a", EXPIRED_S)], EXPIRED_S, 0.0, -1.0),
     ],
 )
 def test_a_press_is_held_for_its_hold_time(

@@ -15,11 +15,8 @@ from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.twin.robots import until
 
 DESK: Final[dict[str, Any]] = {"viewport": {"width": 1280, "height": 800}}
-PHONE: Final[dict[str, Any]] = {
-    "viewport": {"width": 390, "height": 844},
-    "has_touch": True,
-    "is_mobile": True,
-}
+_UPRIGHT: Final = {"width": 390, "height": 844}
+PHONE: Final[dict[str, Any]] = {"viewport": _UPRIGHT, "has_touch": True, "is_mobile": True}
 PHONE_ON_ITS_SIDE: Final[dict[str, Any]] = PHONE | {"viewport": {"width": 844, "height": 390}}
 
 # Pins of the drive of `CAR`, forward and backward.

@@ -104,10 +104,8 @@ def test_a_displaced_page_reconnects_only_on_request(car: RunningRobot, visit: V
     console = visit(car)
     console.await_state(link="open")
     with contextlib.ExitStack() as stack:
-        people = [
-            stack.enter_context(car.client(role="person", name=f"person {n}", frames=False))
-            for n in range(8)
-        ]
+        clients = (car.client(role="person", name=f"person {n}", frames=False) for n in range(8))
+        people = [stack.enter_context(client) for client in clients]
         console.await_state(link="displaced")
         console.await_words("#key-trouble", "8 clients are the limit. Connect again")
         for person in people:

@@ -18,9 +18,8 @@ from tests.robots import BLIND_CAR, IN_A_ROOM, changed, write_profile
 @pytest.fixture(scope="package")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
     folder = tmp_path_factory.mktemp("attacked")
-    profile = write_profile(
-        folder, changed("mix = { throttle = 1.0 }", f"mix = {{ throttle = {CAP} }}", BLIND_CAR)
-    )
+    mix = "mix = {{ throttle = {} }}".format
+    profile = write_profile(folder, changed(mix(1.0), mix(CAP), BLIND_CAR))
     with run_robot(profile, folder=folder, arguments=IN_A_ROOM) as served:
         yield served
 

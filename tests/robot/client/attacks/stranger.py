@@ -224,9 +224,8 @@ class Stranger:
         self.arm()
 
     def drive(self, seq: int, *values: float, **fields: Any) -> None:
-        self.send(
-            "command", **({"seq": seq, "answers": self.observe()["seq"]} | fields), values=values
-        )
+        answered = {"seq": seq, "answers": self.observe()["seq"]}
+        self.send("command", **(answered | fields), values=values)
 
     def refusal(self) -> str:
         """Return the reason of the next refusal; "closed" if the connection ends without one."""

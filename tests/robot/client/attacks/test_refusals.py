@@ -144,12 +144,8 @@ FRAMES: Final[dict[str, tuple[str, list[bytes]]]] = {
     "deep_nesting": ("Not a valid message", [frame(b"\x91" * 60_000)]),
     "text_message": ("binary messages", [frame(b'{"kind":"emergencystop"}', TEXT)]),
 }
-ATTACKS.update(
-    {
-        name: (lambda scene, sent=sent: framed(scene, *sent), words)
-        for name, (words, sent) in FRAMES.items()
-    }
-)
+for name, (words, sent) in FRAMES.items():
+    ATTACKS[name] = (lambda scene, sent=sent: framed(scene, *sent), words)
 
 
 # With the key, against a person who has control.
