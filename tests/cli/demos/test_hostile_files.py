@@ -328,7 +328,7 @@ DATASETS: Spoilt = {
         ),
         "bytes: too many",
     ),
-    "a space of 10^9 values": (space_of_others, "must consist of Box, Discrete"),
+    "a space of 10^9 values": (space_of_others, "must consist of Box or Discrete"),
 }
 
 
