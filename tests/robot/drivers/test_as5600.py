@@ -20,7 +20,7 @@ def _registers(counts: int, status: int = 0x20) -> dict[int, int]:
 
 
 def _rig() -> tuple[FakeHardware, FakeBus]:
-    # Both channels have the same encoder; the twin simulates a real multiplexer.
+    # The fake has one encoder for both channels; only the twin simulates the multiplexer.
     hardware = FakeHardware({_MUX: {}, _ENCODER: _registers(1124)})
     return hardware, hardware.bus
 
@@ -69,7 +69,7 @@ def test_missing_hardware_is_reported_on_opening(
 
 @pytest.mark.parametrize("lost", [_MUX, _ENCODER])
 def test_a_short_dropout_is_tolerated(lost: int) -> None:
-    """A joint is absent at first, and a fault from the fifth failed reading in a row."""
+    """Four failed readings in a row omit the joint; from the fifth on, an error is raised."""
     hardware, bus = _rig()
     sensor = hardware.sensor("as5600", **_TWO)
     chip = bus.chips.pop(lost)

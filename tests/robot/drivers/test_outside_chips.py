@@ -1,4 +1,4 @@
-"""Keys of chips, and a sensor and an actuator of another package: one file each."""
+"""Chips of another package: a sensor and an actuator in one file each; and keys of all chips."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -45,7 +45,7 @@ def test_servo_gets_no_pulse_before_the_first_write() -> None:
 
 
 def test_servo_is_limited_in_speed() -> None:
-    """At 180 degrees of travel, 90 degrees a second are a value of 1 a second."""
+    """A servo turns by 180 degrees from -1 to 1, so 90 degrees per second are 1 per second."""
     servo = FakeHardware().output("servo", **_AT | {"travel_deg_per_s": 90.0})
     assert servo.write(0.0, 0) == 0.0
     assert servo.write(1.0, 100 * MS) == pytest.approx(0.1)
@@ -69,7 +69,7 @@ def test_controller_gets_neutral_until_it_is_armed() -> None:
 
 
 @pytest.mark.parametrize(("reverse", "value", "us"), [("none", 0.0, 1500), ("direct", -1.0, 1000)])
-def test_controller_without_a_brake_reverses_at_once_or_not(
+def test_controller_without_a_brake_reverses_at_once_or_never(
     reverse: str, value: float, us: int
 ) -> None:
     hardware = FakeHardware()
@@ -103,7 +103,7 @@ _SETUP = [(0xFD, [0x10]), (0x00, [0x30]), (0xFE, [121])]
 def test_chip_is_set_up_asleep_and_woken(
     registers: dict[int, int], first: list[tuple[int, list[int]]]
 ) -> None:
-    """Stale channels are off before waking; a configured chip pulses its other channels on."""
+    """A sleeping chip turns all channels off before it wakes; an awake chip need not."""
     hardware = FakeHardware({0x40: registers})
     hardware.output("servo", **_ON_CHIP, channel=3)
     last = [(0x01, [0x04]), (0x00, [0x20]), (0x06 + 12, [0, 0, 0, 0x10])]
@@ -171,7 +171,7 @@ def test_outputs_stay_off_while_the_state_of_a_channel_is_unknown() -> None:
 
 
 def test_outputs_of_a_dead_process_do_not_come_back() -> None:
-    """Opening a channel clears stale pulses on all others."""
+    """With an output-enable pin, opening a channel turns off the pulses of all channels."""
     stale = {0x06 + 4 + 2: 410 & 0xFF, 0x06 + 4 + 3: 410 >> 8}  # Channel 1: 2000 us.
     hardware = FakeHardware({0x40: {0x00: 0x20, 0xFE: 121} | stale})
     hardware.output("esc", **_ON_CHIP | {"output_enable": 26}, channel=0)

@@ -78,7 +78,7 @@ def _echo(hardware: FakeHardware, seconds: float) -> None:
     hardware.factory.drive(24, 0, 1.0 + seconds)
 
 
-def test_echo_is_a_distance_of_pings_60_ms_apart() -> None:
+def test_an_echo_gives_the_distance_and_pings_are_60_ms_apart() -> None:
     """The distance is half the echo time times the speed of sound, up to `max_m`.
 
     With shorter intervals, a ping could receive the echo of the previous ping.
@@ -95,7 +95,7 @@ def test_echo_is_a_distance_of_pings_60_ms_apart() -> None:
             _echo(hardware, 2 * 0.5 / 343.2)
     assert pings == [0, 60, 120]
     assert hardware.factory.log[:2] == [("GPIO23", 1.0), ("GPIO23", 0.0)]
-    _echo(hardware, 0.038)  # Sent when there was no echo.
+    _echo(hardware, 0.038)  # The sensor's pulse if there is no echo.
     assert sonar.read(180 * MS, 1.0)["distance"] == 2.0
     sonar.close()
 
@@ -120,7 +120,7 @@ def test_a_ping_never_sleeps(monkeypatch: pytest.MonkeyPatch, is_real: bool) -> 
 def test_sonar_fails_after_three_missed_echoes_and_comes_back(
     rises: bool, seen: dict[str, float]
 ) -> None:
-    """The last distance is reported until then; an echo line that stays high is no echo."""
+    """Until it fails, it reports the last distance; an echo line that stays high is no echo."""
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
     sonar.read(0, 1.0)

@@ -72,7 +72,7 @@ class Claim(NamedTuple):
     key: str  # Name of the key that claims it.
     resource: str  # A pin, a channel or an address.
     group: str = ""  # Users of one group may share it; "" for exclusive use.
-    use: str = ""  # What it is used for, as the end of a sentence; may be empty.
+    use: str = ""  # Addition in messages, such as ", a wire of I2C bus 1,"; "" for none.
 
 
 class Keys(msgspec.Struct, frozen=True):
@@ -250,7 +250,7 @@ class SensorChip:
         measures: Its quantities; see `SensorPlan.measures`.
         keys: Its keys in a profile, in addition to `driver`.
         open: Opens its driver.
-        simulate: Its simulation; None if a twin reads the real sensor, such as a file.
+        simulate: Its simulation; None if its driver uses neither a pin nor an I2C bus.
         features: State features that only this sensor measures; None if `measures` determines them.
         rows: Keys of each nested table, such as the table of a joint; None if the sensor has no
             nested tables. They are decoded into the field `rows` of `keys`, keyed by table name.
@@ -291,7 +291,7 @@ class OutputChip:
         lights: LEDs that replace it on a bench: the key of each pin, a label after the name of the
             output, and the value that lights it; empty if LEDs cannot replace it.
         drives: Whether it can propel a robot, regardless of its part.
-        stops_itself: Whether it stops by itself without the guard, and must not be written to then.
+        stops_itself: Whether it stops by itself when the guard ends, so that `make_safe` skips it.
     """
 
     keys: type[Keys]

@@ -27,7 +27,7 @@ _PERIOD_NS: Final = 100_000_000  # A battery changes slowly, and the bus is shar
 
 
 class Ina219Keys(I2cKeys, frozen=True, kw_only=True):
-    """Keys of an INA219. Its default, 0x40, is also a PCA9685's: change one by a solder bridge."""
+    """Keys of an INA219. A PCA9685 has the same default address: change one by a solder bridge."""
 
     address: Annotated[int, Meta(ge=0x40, le=0x4F)] = 0x40
 

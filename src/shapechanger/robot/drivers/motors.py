@@ -178,7 +178,7 @@ class PhaseEnable(_DutyMotor):
 
     def _drive(self, drive: float, written: float | None) -> None:
         phase, enable = self._first, self._second
-        # The motor is switched off only to change direction, because it would stutter.
+        # Switch off first, except between two speeds in one direction: the motor would stutter.
         if written is None or drive * written <= 0.0:
             enable.off()
             if drive:

@@ -29,7 +29,7 @@ from shapechanger.robot.drivers.simulation import NO_PULSE, DutyOf, Levels, Wire
 from shapechanger.robot.hardware import Hardware
 
 Width = Annotated[int, Meta(ge=500, le=2500)]
-"""Width of a pulse, µs, that lgpio.tx_servo accepts; servos and controllers use no others."""
+"""Width of a pulse for a servo or controller, µs, in the range that lgpio.tx_servo accepts."""
 
 
 class PulsedKeys(Keys, frozen=True, kw_only=True):
@@ -282,7 +282,7 @@ class EscKeys(PulsedKeys, frozen=True, kw_only=True):
         arm_s: Time at neutral before the controller obeys, s.
         reverse: "double" if the controller brakes at the first pulse backward and reverses at the
             second, "none" if it cannot reverse.
-        brake_ms: Time for which "double" brakes, and then waits at neutral, ms.
+        brake_ms: With "double": duration of the brake, and of the neutral after it, ms each.
     """
 
     widths: ClassVar = ("backward_us", "neutral_us", "forward_us")

@@ -16,7 +16,7 @@ class RelayKeys(Keys, frozen=True, kw_only=True):
 
 
 class Relay:
-    """Relay that is on above one half; see `OutputDriver`."""
+    """Relay that is on for values above 0.5; see `OutputDriver`."""
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         from gpiozero import DigitalOutputDevice

@@ -7,11 +7,11 @@ from tests.robot.drivers.servos.rigs import NAMES, Rig, of, servo, settings
 
 
 @pytest.mark.parametrize("family", ["Dynamixel", "Feetech"])
-def test_another_servo_than_in_the_settings_is_refused(family: str) -> None:
-    """The error names all missing servos, or a servo of another model."""
+def test_missing_servos_and_another_model_are_refused(family: str) -> None:
+    """The error names all missing servos, or the servo that is of another model."""
     rig = Rig(of(family))
     rig.twin("FDS").mute = rig.twin("PI").deaf = True
-    text = r"no servo answers as FDS \(id 2\), PI \(id 7\); those that do: FDP \(id 1\), EIP"
+    text = r"no servo answers as FDS \(id 2\), PI \(id 7\); these answer: FDP \(id 1\), EIP"
     with pytest.raises(RobotError, match=text):
         rig.bus.set_up()
     rig = Rig(of(family))
@@ -64,9 +64,9 @@ def test_setup_configures_servos_without_torque(family: str, expected: str) -> N
 def test_a_setting_that_is_not_kept_is_an_error(
     family: str, register: int, data: bytes, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A Feetech servo does not report refusals, so its registers are read back; a Dynamixel does.
+    """A Dynamixel servo reports refusals; registers of a Feetech servo are read back instead.
 
-    The torque of all servos is off again.
+    After the error, the torque of all servos is off.
     """
     rig = Rig(of(family))
     servo = rig.twin("EDC")
@@ -96,7 +96,7 @@ def test_torque_is_enabled_last_and_eeprom_writes_are_avoided() -> None:
 
 
 def test_a_stop_ramps_down_and_releases() -> None:
-    """A mute servo stops all others within 300 ms; only a new hold ends the stop."""
+    """A fault of one servo stops all within 300 ms; only `ready` ends the stop."""
     rig = Rig().start()
     rig.run(12.0, 50)
     rig.one("EIP").fault = "It has a fault."
@@ -186,14 +186,14 @@ def test_a_length_is_reached_in_either_direction(direction: int) -> None:
     rig.run(20.0, 200, length=-0.01)
     assert rig.bus.reason == ""
     seen = rig.run(None)["FDP"]
-    # 3 N of the spring and 1 N of the gears are held with an error of the position.
+    # Holding the spring's 3 N against 1 N of friction takes an error of the position.
     assert seen["length"] == pytest.approx(-0.01, abs=1e-3)
     assert rig.one("FDP").goal_n == pytest.approx(20.0, abs=0.03)
     assert 1.0 < seen["tension"] < 5.0
 
 
 def test_the_tension_of_a_blocked_tendon_is_limited() -> None:
-    """At the stop of the springs, 20 mm, the limit holds although the goal is beyond."""
+    """Springs stop at 20 mm; a goal of 30 mm does not raise the tension above its limit."""
     rig = _rig()
     rig.run(8.0, 300, length=-0.03)
     assert rig.twin("EDC").motor.current == pytest.approx(8.0 / 29.3, rel=0.01)

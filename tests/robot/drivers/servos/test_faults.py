@@ -69,7 +69,7 @@ def test_a_fault_of_one_servo_stops_all(family: str, fault: _Fault, text: str) -
     assert rig.twin("FDP").pulls_a > 0.05
     rig.run(None, 40)
     if rig.bus.mode == "silent":
-        text = "EIP did not confirm to let go, so nothing is sent any more"
+        text = "EIP did not confirm the release, so nothing is sent any more"
         assert text in rig.bus.reason
         sent = len(rig.port.sent)
         rig.run(None, 3)
@@ -118,7 +118,7 @@ def test_three_mute_servos_are_each_found() -> None:
 def test_a_power_dip_invalidates_the_zero(
     most_missed: int, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The servo has no length, and the robot is not armed before its zero has been found."""
+    """The servo reports no length, and the robot cannot be armed until its zero is found."""
     monkeypatch.setattr("shapechanger.robot.drivers.servos.servo._MOST_MISSED", most_missed)
     rig = Rig().start()
     rig.run(4.0, 5)
@@ -169,7 +169,7 @@ def test_without_watchdogs_an_unplugged_adapter_ends_in_silence_at_once() -> Non
     rig.port.is_gone = True
     rig.run(20.0)
     assert rig.bus.mode == "silent"
-    text = "did not confirm to let go, so nothing is sent any more: [enable] stops"
+    text = "did not confirm the release, so nothing is sent any more: [enable] stops"
     assert text in rig.bus.reason
     with pytest.raises(RobotError, match="is gone"):
         rig.bus.let_go()
@@ -195,8 +195,8 @@ def test_an_unplugged_adapter_is_reported_and_trips_the_watchdogs() -> None:
 @pytest.mark.parametrize(
     ("deaf_for", "text"),
     [
-        (102, "Servo PI (id 7) has a goal of 136 counts, and was sent 273"),
-        (64, "Servo PI (id 7) has let go by itself."),
+        (102, "Servo PI (id 7) has a goal of 136 counts, and was sent 273"),  # Goal current.
+        (64, "Servo PI (id 7) has let go by itself."),  # Torque enable.
     ],
 )
 def test_a_goal_or_torque_that_is_not_in_effect_is_reported(

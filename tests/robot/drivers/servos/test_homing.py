@@ -24,7 +24,7 @@ def rig() -> Rig:
 
 
 def test_homing_finds_the_position_at_the_homing_tension(rig: Rig) -> None:
-    """3 N minus 1 N of friction stretch 300 N/m by 6.7 mm, wherever the spools started."""
+    """3 N less 1 N of friction stretch springs of 300 N/m by 6.7 mm from any start of a spool."""
     before = {name: rig.one(name).read("position") for name in NAMES}
     zeros = home(rig.bus, partial(_cycle, rig))
     mm = 1e3 * 2 * 3.14159 * 0.005 / 4096

@@ -147,10 +147,10 @@ _FEETECH = bytes.fromhex("0590 0380 0000 4a 1f 00 00 00 0000 0780".replace(" ", 
 
 
 def test_present_values_are_signed() -> None:
-    """A velocity of -3 is FD FF FF FF, or 3 with a bit for the sign; a count of current is 7 mA.
+    """A speed of -3 is FD FF FF FF (Dynamixel), or 3 with the top bit set (Feetech).
 
-    Feetech has position, speed, load, voltage, temperature, two flags, status, and last the
-    current.
+    A Feetech servo reports position, speed, load, voltage, temperature, two flags, status, and
+    last the current.
     """
     seen = _one(servo("FDP", direction=-1)).see(_DYNAMIXEL, 0, pulls=False)
     assert seen["length"] == pytest.approx(-2 * math.pi * 0.005)

@@ -163,7 +163,7 @@ class ServoBus:
             bus = self._settings
             raise RobotError(
                 f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "
-                f"those that do: {there or 'none'}. Look at power, cables, ids and baud, and at "
+                f"these answer: {there or 'none'}. Look at power, cables, ids and baud, and at "
                 "the latency timer of the adapter."
             )
         for one, number in zip(self.servos.values(), numbers.values(), strict=True):
@@ -241,7 +241,7 @@ class ServoBus:
                     self.mode = "off"
                     return
         names = ", ".join(one.settings.name for id_, one in self.servos.items() if id_ in holding)
-        silence = f"{names} did not confirm to let go, so nothing is sent any more"
+        silence = f"{names} did not confirm the release, so nothing is sent any more"
         who = "the servos' own watchdogs stop" if self._family.has_watchdog else "[enable] stops"
         self._gone = f"{self._gone} {silence}: {who} them.".lstrip()
         self.mode = "silent"

@@ -100,7 +100,7 @@ class TendonServo:
         self.missed = 0  # Cycles in a row without an answer.
 
     def request(self, tension: float, length: float | None = None) -> None:
-        """Request a tension, N; with a length beyond the zero, m, its limit. Both are clipped."""
+        """Request a tension, N; or a length beyond the zero, m, with the tension as its limit."""
         servo = self.settings
         if not math.isfinite(tension) or not math.isfinite(length or 0.0):
             raise RobotError(f"{servo.label} cannot pull {tension} N to a length of {length} m.")

@@ -150,7 +150,7 @@ class ServoModel(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def ampere_per_goal(self) -> float:
-        """Unit of its goal, A; at rest, if the goal is a fraction of the stall torque."""
+        """Unit of its goal, A; for a fraction of the stall torque, with the motor at rest."""
         is_current = "tension" in self.family.modes
         return self.ampere_per_count if is_current else self.stall_a / self.most_counts
 

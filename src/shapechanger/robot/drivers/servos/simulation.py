@@ -12,8 +12,8 @@ a rig:
 - A servo needs 0.3 s to start.
 - In a sync read, servos behind a silent one stay silent, the worst case.
 - With control of the length, the current is proportional to the error of the position, reaches the
-  stall current at 1/32 turn, and is limited by the goal. `bam`'s STS3215 has 32 times 0.166 per
-  rad.
+  stall current at 1/32 turn (5.1 times the stall current per rad), and is limited by the goal. In
+  `bam`, the STS3215 has 32 times 0.166, 5.3 per rad.
 - The goal of a Feetech servo limits the voltage, and with it the torque of a motor at rest.
 - A Feetech servo does not report which instructions it refuses, and refuses to write to its EEPROM
   while that is locked. After an overload it has no torque until its power is cycled.
