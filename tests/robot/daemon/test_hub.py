@@ -66,7 +66,7 @@ def test_a_frame_is_sent_once_to_each_client_that_requests_frames() -> None:
 
 
 def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
-    """An order carries the limits of its command and the time of the frame."""
+    """The guard gets the scaled values, the lifetime, and the time of the newest frame."""
     orders: list[Order] = []
     hub = new_hub(orders.append)
     hub.take(ANN)

@@ -47,7 +47,7 @@ class Connected:
         return max(0, max(self.sent, default=0) - back)
 
     def number(self, kind: type[link.Command | link.Suggest], ahead: int) -> tuple[int, bool]:
-        """Return the largest number so far plus `ahead`, and whether the sum is larger than it."""
+        """Return the newest number plus `ahead`, at least 0, and whether it is a larger number."""
         newest, number = self.newest[kind], max(0, self.newest[kind] + ahead)
         self.newest[kind] = max(newest, number)
         return number, number > newest

@@ -27,7 +27,7 @@ from shapechanger.robot.link import messages
 _MAX_CLIENTS: Final = 8  # Most clients connected at the same time.
 _MAX_PROGRAMS: Final = 6  # Most programs, so that two people can connect without displacing any.
 _NS_PER_MS: Final = 1_000_000
-_ARRIVALS: Final = 64  # Arrival times to store; more than commands can be pending.
+_ARRIVALS: Final = 64  # Number of stored arrival times; fewer commands can be pending.
 _APPLIED: Final = "/applied"
 _ABSENT: Final = "absent"
 _FRAME_WAIT_S: Final = 2.0  # Real time that a frame may spend in the camera's driver.
@@ -124,7 +124,7 @@ class SessionHub:
     def take(self, client: Client) -> None:
         """Give control to a client and report it to all, or report the refusal to the client.
 
-        A person takes control from a program at once; no client takes it from any other.
+        A person takes control from a program at once; otherwise the client in control keeps it.
         """
         held = self.holder
         if held is not None and held is not client and (held.is_person or not client.is_person):
@@ -175,7 +175,7 @@ class SessionHub:
 
     def halt(self) -> None:
         """Drop the newest command, because the lease holder sent an invalid one after it."""
-        # Not `give_order`, which may add a step of time: the sender's next observation is a step.
+        # After `give_order`, `settle` would add a step of time to the step of the next observation.
         self._command = _NOTHING
         self._order(Order(kind="halt", issued_ns=self.now_ns()))
 
@@ -197,7 +197,7 @@ class SessionHub:
         now_ns, state, frame, holder = self.now_ns(), self.state, self.frame, self.holder
         at_ns = state.at_ns or now_ns
         known = state.quantities | dict(zip(self._applied, state.applied, strict=False))
-        # A command of another lease came from another client.
+        # A command of an earlier lease is not reported: it may be another client's.
         drives = state.applied_seq is not None and state.applied_session == self.lease
         command, suggestion = (
             pending if now_ns <= pending.until_ns else _NOTHING

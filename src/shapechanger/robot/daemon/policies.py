@@ -64,7 +64,7 @@ class PolicyRunner:
         self._task: asyncio.Task[None] | None = None
 
     def serve(self, port: int, key: str, fingerprint: bytes) -> None:
-        """Set how policies reach the robot, and start the policy that starts with it, if any."""
+        """Set how policies reach the robot, and start the policy of the plan, if there is one."""
         self._robot = {
             "name": self._plan.card.robot,
             "address": str(address_here(self._plan.host, port)),

@@ -105,7 +105,7 @@ class Listener:
             self.add(key, connection)
 
     def stop_timer(self, key: Hashable) -> None:
-        """End the timeout of a connection that opened the link; its hello has another timeout."""
+        """End the timeout of a connection that opened the link: a hello has its own timeout."""
         if connection := self._waiting.get(key):
             connection.timer.cancel()
 
@@ -142,7 +142,7 @@ class Listener:
             fails = False
             protocol = self._protocol()
             self.add(protocol, AcceptedSocket(accepted, address[0], protocol, self._tls))
-            await asyncio.sleep(0)  # Let the connected clients run, however many arrive.
+            await asyncio.sleep(0)  # Let other tasks run, even if connections arrive very fast.
 
 
 class AcceptedSocket:
@@ -290,7 +290,7 @@ class Server:
         self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
         response = await handler(request)
-        # Over a slow radio, the files of the console arrive one by one within this timeout.
+        # Over a slow radio, the timeout applies to each file of the console separately.
         self._listener.renew(request.protocol)
         return response
 

@@ -437,8 +437,8 @@ def _tune(transport: asyncio.Transport | None) -> None:
     """Disable delays, limit buffers, and detect when the other end has disconnected."""
     if transport is None:
         raise LinkError("The connection ended.")
-    # With 0, asyncio's TLS would report an empty buffer as full every second time, and a message
-    # would only count as sent when the next message is sent.
+    # With `high=0`, asyncio's TLS would report an empty buffer as full every second time, and a
+    # message would only count as sent when the next message is sent.
     transport.set_write_buffer_limits(high=1, low=0)
     accepted = transport.get_extra_info("socket")
     accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
