@@ -46,7 +46,7 @@ def test_settings_are_plain_numbers_in_file_order() -> None:
 
 
 def test_layouts_are_in_newtons_metres_and_radians() -> None:
-    """Actions are the pretension at 0 and the maximum at 1; states have tendons, then joints."""
+    """An action of 0 is the pretension, 1 the largest tension; states list tendons, then joints."""
     action = _PROFILE.action_layout()["FDP"]
     assert (action.low, action.high, action.gain, action.gain_unit) == (0.0, 1.0, 14.0, "N")
     assert _PROFILE.action_layout()["LUM"].gain == pytest.approx(5.4)
@@ -65,7 +65,7 @@ def test_layouts_are_in_newtons_metres_and_radians() -> None:
 
 
 def test_the_gain_of_an_action_is_in_the_unit_that_its_servo_controls() -> None:
-    """An action of a length spans longest to shortest; an action of two tendons has no unit."""
+    """For a length, the gain is longest less shortest, m; an action of two tendons has no unit."""
     keys = 'id = 1\ncontrol = "length"\nlongest_m = 0.01\nshortest_m = -0.03\n'
     both = _TEXT.replace(_part("[action.FDS]", "[action.EIP]"), "")
     for text, gain, unit in (

@@ -13,7 +13,7 @@ from tests.robot.profile.texts import EVERYTHING
 
 
 def test_names_and_paths() -> None:
-    """Names of shipped profiles resolve to their files; any other argument is a path."""
+    """Shipped names resolve to their files, and paths to themselves; other names are refused."""
     assert find_profile("car") == shipped_profiles()["car"]
     assert find_profile("car.toml") == Path("car.toml")
     assert find_profile("robots/car") == Path("robots/car")
@@ -46,7 +46,7 @@ def test_a_profile_in_the_working_folder_has_a_name(
         ("zzz.toml", r"zzz\.toml; there are: boat, .*, my-car\.$"),
     ],
 )
-def test_a_missing_profile_has_a_nearest_spelling(tmp_path: Path, name: str, hint: str) -> None:
+def test_a_missing_profile_is_an_error_with_a_hint(tmp_path: Path, name: str, hint: str) -> None:
     (tmp_path / "my-car.toml").touch()
     with pytest.raises(ProfileError, match=hint):
         load_profile(tmp_path / name)

@@ -64,7 +64,7 @@ def _state_features(plan: GuardPlan) -> list[Feature]:
 def _tendon_spans(outputs: Sequence[OutputPlan]) -> dict[str, tuple[float, str]]:
     """Return span and unit of each action that moves exactly one tendon.
 
-    The span is the rise of the tension, N, or the fall of the length, m, from 0 to 1.
+    The span is the rise of the tension, N, or the fall of the length, m, over the values 0 to 1.
     """
     moved = [name for output in outputs for name in output.mix]
     spans: dict[str, tuple[float, str]] = {}

@@ -288,7 +288,7 @@ _NEARLY_ZERO: Final = 1e-9
 
 
 def _check_mix(root: Table, profile: Profile) -> None:
-    """Refuse outputs and actions without a connection, and outputs that drive at rest."""
+    """Refuse an output without actions, an action without outputs, and an output driven at rest."""
     rests = {action.name: action.rest for action in profile.actions}
     for output in profile.outputs:
         table = root.table("output", output.name)

@@ -29,9 +29,9 @@ Place = tuple[str | int, ...]
 def line_of(text: str, place: Place) -> int:
     """Return the line on which a table or key of a TOML text begins, from 1.
 
-    `tomllib` keeps no line numbers, but the beginning of a text up to the end of a statement is
-    valid TOML, so the line follows from the shortest beginning with the key. The text must have
-    Unix line ends. For a missing key the line of its table is returned.
+    `tomllib` keeps no line numbers, but the first lines of a text, up to the end of a statement,
+    are valid TOML: the key is on the last of the fewest first lines that contain it. The text must
+    have Unix line ends. For a missing key the line of its table is returned.
     """
     lines = text.split("\n")
 
