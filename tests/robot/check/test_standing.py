@@ -117,7 +117,7 @@ def test_missing_safety_hardware_is_reported(tmp_path: Path, car: Profile) -> No
     rig = replace(read(finger_text("Feetech")), camera=None)
     found = _found(StandingRobot(rig, root=tmp_path))
     ((level, sentence),) = found["enable line"]
-    assert (level, "as servos without a watchdog must" in sentence) == ("good", True)
+    assert (level, "motors and servos without a watchdog must" in sentence) == ("good", True)
     assert any("gpiochip0 does not exist" in sentence for _, sentence in found["devices"])
     bare = _on(tmp_path, replace(rig, enable_pin=None))["enable line"]
     assert (bare.level, "Fit the one-shot" in bare.sentence) == ("bad", True)

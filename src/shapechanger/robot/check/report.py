@@ -24,7 +24,7 @@ from shapechanger.robot.setup.install import Machine
 Level = Literal["good", "bad", "unknown"]
 Result = tuple[Level, str]  # A level and a sentence.
 Results = Iterable[Result]  # A check: an iterator that performs it and yields its results.
-Checks = Iterable[tuple[str, Results]]  # Each begins when the previous one has ended.
+Checks = Iterable[tuple[str, Results]]  # Names and checks, which are performed one by one.
 MARKS: Final[dict[Level, str]] = {"good": "good", "bad": "BAD", "unknown": "?"}
 
 
@@ -42,9 +42,9 @@ def judged(good: bool, sentence: str, otherwise: str = "") -> Result:
 
 
 def run_checks(checks: Checks, limit_s: float) -> Iterator[Finding]:
-    """Yield the findings of checks, each of which has ended, failed, or taken `limit_s` seconds.
+    """Perform checks one by one, each for at most `limit_s` seconds, and yield their findings.
 
-    Each check runs in a separate thread, which is abandoned if its driver hangs.
+    Each check runs in a separate thread, which is abandoned after this time.
     """
     for name, results in checks:
         found: list[Result] = []

@@ -53,7 +53,7 @@ class StandingRobot:
     hardware: Callable[[], Hardware] = Hardware  # Opens its pins and buses.
     motors_off: bool = False  # Whether the motors' supply is off, so resistors can be tested.
     installed: bool = True  # Whether this is the robot's computer; False for a bench with LEDs.
-    on_twin: bool = False  # A twin's computer has all pins and buses but no settings.
+    on_twin: bool = False  # Whether it is a twin, which has all pins and buses but no settings.
     credentials: Path | None = None  # Folder of key and certificate; None for `init`'s folder.
 
     @cached_property
@@ -189,8 +189,8 @@ def _enable_line(guard: GuardPlan) -> Result:
         return "good", "Each servo has its own watchdog, and releases when its bus is silent."
     return judged(
         guard.enable_pin is not None,
-        f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges the motors lose "
-        "power, as servos without a watchdog must. Measure that once: it cannot be checked here.",
+        f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges, motors and servos "
+        "without a watchdog must lose power. Measure that once: it cannot be checked here.",
         "The profile has no [enable] pin: if guard and supervisor are killed together, only "
         "strict_gpiod and pull-downs are left. Fit the one-shot of the hardware guide.",
     )
@@ -226,7 +226,7 @@ def _camera(plan: CameraPlan) -> Results:
 
 def _geometry(plan: CameraPlan) -> Result:
     if plan.pitch_deg is None or plan.fovy_deg is None:
-        reason = "pitch_deg and fovy_deg are not stated, which policies with waypoints need: "
+        reason = "pitch_deg and fovy_deg are missing, and policies with waypoints need them: "
         return "unknown", reason + "`shapechanger robot camera` measures them."
     view = f"It looks {plan.pitch_deg:g} degrees down and sees {plan.fovy_deg:g} degrees from "
     return "good", view + "top to bottom; `shapechanger robot camera` draws it."
@@ -262,7 +262,7 @@ def _resistors(robot: StandingRobot) -> Results:
     supply of the motors must be off.
     """
     if not (robot.has_pins and robot.motors_off):
-        lacks = "take the motors' supply off, and add --motors-off"
+        lacks = "switch the motors' supply off, and add --motors-off"
         yield "unknown", f"Not tested: {lacks if robot.has_pins else 'this computer has no pins'}."
         return
     down = ("down", "high", "ground, because it may run while no program holds the pin")
