@@ -1,7 +1,8 @@
-"""Start the guard or the supervisor as `robot/guard/start.py` does, with importable tests.
+"""Start the guard or the supervisor as `robot/guard/start.py` does, on the pins of `recording.py`.
 
 The arguments are the path of `start.py`, the program, and its arguments. Isolated mode ignores
-PYTHONPATH, so the repository is added to the path here. The daemon is a stand-in.
+PYTHONPATH, so the repository, which has `recording.py`, is added to the path. `stand_in.py` is
+the daemon.
 """
 
 import runpy

@@ -1,4 +1,4 @@
-"""Outputs: mixed from actions, estimated back from deviations, and made safe."""
+"""Outputs: their values from actions, estimates of the applied actions, and `make_safe`."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -475,7 +475,7 @@ def test_the_outputs_rest_before_anything_is_closed(
     bench.guard.close()
     assert duties == [0.0]
     assert {one.args for one in write.mock_calls} == {(0.0, bench.clock.time_ns)}
-    assert write.call_count == 2  # And once more before the pins are closed.
+    assert write.call_count == 2  # First of all, and again before the pins are closed.
 
 
 @pytest.mark.parametrize(
@@ -639,7 +639,7 @@ def test_the_program_fails_if_an_output_does_not_rest(
         program.run()
     assert ended.value.code == 1
     last = capfd.readouterr().err.splitlines()[-1]
-    assert last == "guard: ends, for RobotError: not all outputs are at rest"
+    assert last == "guard: ends because of RobotError: not all outputs are at rest"
     program.hardware.close.assert_called_once_with()
 
 
@@ -650,6 +650,6 @@ def test_wrong_arguments_of_the_program_are_logged(
         main(["--plan-fd", "3"])
     assert ended.value.code == 1
     assert capfd.readouterr().err == (
-        "guard: ends, for ValueError: This takes --plan-fd N --daemon-fd N --heartbeat-fd N, "
-        "not --plan-fd 3.\n"
+        "guard: ends because of ValueError: This takes --plan-fd N --daemon-fd N "
+        "--heartbeat-fd N, not --plan-fd 3.\n"
     )

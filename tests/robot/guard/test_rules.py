@@ -49,14 +49,14 @@ class _Armed:
         return self.rules.tick(self.now_ns)
 
     def ask(self, throttle: float) -> tuple[float, str]:
-        """Command a throttle, and return the decision on it and its reason."""
+        """Command a throttle, and return the applied throttle and the stop reason."""
         assert self.order(0.5, throttle) == ""
         decision = self.tick()
         assert decision.actions[0] == 0.5
         return decision.actions[1], decision.stop_reason
 
     def change(self, at_ms: float) -> tuple[OutputDecision, OutputDecision]:
-        """Return the decisions just before a time, at which the rules wake, and at it."""
+        """Return the decisions 1 ns before a wake time of the rules, and at this time."""
         self.now_ns = _T0 + round(at_ms * MS) - 1
         assert self.rules.next_wake_ns(self.now_ns) == self.now_ns + 1
         before = self.tick()
@@ -268,7 +268,7 @@ def test_a_near_or_unknown_obstacle_prevents_driving_forward(sensing: Sensing, r
     assert robot.ask(0.5) == (0.0, reason)
     assert robot.ask(-0.4) == (-0.4, "")
     robot.sense(distance=0.3)
-    assert robot.ask(0.5) == (0.0, "")  # Through rest.
+    assert robot.ask(0.5) == (0.0, "")  # A change of sign passes through rest.
     assert robot.ask(0.5) == (0.5, "")
     other = _driving()
     other.rules.sense(sensing, _T0)
@@ -292,7 +292,7 @@ def test_a_stall_stops_until_another_command(throttle: float, way: str) -> None:
         robot.wait(1)
         robot.sense(speed=0.0)
     assert robot.ask(-throttle / 2) == (-throttle / 2, "")
-    assert robot.ask(throttle) == (0.0, "")  # Through rest.
+    assert robot.ask(throttle) == (0.0, "")  # A change of sign passes through rest.
     assert robot.ask(throttle) == (throttle, "")
 
 

@@ -28,7 +28,7 @@ from tests.robot.guard.plans import quick_car
 def test_the_order_of_sensors_does_not_matter(
     name: str, values: tuple[float, float], counts: float
 ) -> None:
-    """Of equal readings the first is used, and of quantities without a rank the last."""
+    """Of equal readings the first one is used; of a quantity without a rank, the last reading."""
     for pair in itertools.permutations(zip(values, ("one", "two"), strict=True)):
         sensing = Sensing()
         for value, sensor in (*pair, (counts, "three")):

@@ -166,7 +166,7 @@ def _child(name: str, polls: int) -> Mock:
 
 @pytest.fixture
 def safe(monkeypatch: pytest.MonkeyPatch) -> Mock:
-    """`make_safe`, which succeeds without hardware, with shorter times."""
+    """A `make_safe` that succeeds without hardware; the supervisor's waits are shortened."""
     safe = Mock(return_value=[])
     monkeypatch.setattr(supervisor, "make_safe", safe)
     monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)

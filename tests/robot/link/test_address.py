@@ -65,7 +65,7 @@ def test_loopback_addresses() -> None:
     assert address_here("car.local", 8) == Address("car.local", 8)
 
 
-def test_a_port_that_cannot_be_listened_at() -> None:
+def test_the_error_about_a_port_gives_the_cause() -> None:
     for error, why in (
         (OSError(98, "bind on address"), "Address already in use"),
         (OSError(-2, "Name or service not known"), "[Errno -2] Name or service not known"),

@@ -42,7 +42,7 @@ def test_a_card_states_the_numbers_of_the_profile() -> None:
     assert (twin.camera_pitch_deg, twin.camera_fovy_deg) == (None, None)
 
 
-def test_a_welcome_without_a_limit_is_refused() -> None:
+def test_a_welcome_without_a_required_field_is_refused() -> None:
     card = card_of(load_profile(find_profile("car")))
     fields = msgspec.to_builtins(card) | {"kind": "welcome", "session": 1}
     for missing in ("deadline_ms", "control_hz", "arming", "max_observation_age_ms"):

@@ -37,7 +37,7 @@ from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.hardware import Hardware, connect
 
 _BEAT_S: Final = 0.01
-"""Interval between heartbeats, s of real time; after `guard_silence_ms` the guard is killed."""
+"""Interval between heartbeats, s of real time; a guard silent for `guard_silence_ms` is killed."""
 
 _WAIT_S: Final = 0.01  # Longest wait in real time while a twin's clock is paused, s.
 _STATE_EVERY_NS: Final = 20_000_000  # At least 50 states per second.
@@ -260,7 +260,7 @@ def main(arguments: Sequence[str]) -> None:
     try:
         _guard(arguments, log)
     except Exception as error:
-        log.critical("ends, for %s: %s", type(error).__name__, error)
+        log.critical("ends because of %s: %s", type(error).__name__, error)
         sys.exit(1)
 
 

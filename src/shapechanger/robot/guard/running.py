@@ -205,7 +205,7 @@ def run_promptly(priority: int) -> None:
     a better nice value. Child processes are not real-time.
     """
     run_early()
-    # Missing outside Linux, and not permitted to every user; both are fine.
+    # Only Linux has real-time scheduling, and not for every user; the robot also runs without it.
     with contextlib.suppress(AttributeError, PermissionError):
         resource.setrlimit(resource.RLIMIT_RTTIME, (_MOST_RUN_US, _MOST_RUN_US))
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))

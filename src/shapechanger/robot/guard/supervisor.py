@@ -356,6 +356,6 @@ def main(arguments: Sequence[str]) -> None:
         plan = read_plan_fd(fd)
         code = Supervisor(plan, fd, log).run()
     except Exception as error:
-        log.critical("cannot go on, for %s: %s", type(error).__name__, error)
+        log.critical("cannot continue because of %s: %s", type(error).__name__, error)
         code = _CANNOT_START
     sys.exit(code)

@@ -33,7 +33,7 @@ MAX_EPISODES: Final = 200
 """Most episodes in one `Recordings`; `Browse.before` asks for older ones."""
 
 Role = Literal["person", "program"]
-"""Kind of client. A person can take control from a program at once, but not the reverse."""
+"""Kind of client. A person can take control from a program at once, a program from no client."""
 
 Pace = Literal["realtime", "lockstep"]
 """Pace: both sides follow their clocks, or the robot waits for a command and answers with the
