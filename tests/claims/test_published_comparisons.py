@@ -148,7 +148,7 @@ def test_the_share_of_speed_that_policies_of_limbs_keep():
 
 
 def test_the_atlas_pools_scores_as_the_runs_do(pairs):
-    """A score of 0 is the best return without skill, 1 the target's reference, at the end."""
+    """A score of 0 is the best of random, idle and untrained policies, 1 the reference's end."""
     folder = ROOT / "src" / "shapechanger" / "transfer" / "references"
     references = json.loads((folder / "references.json").read_text(encoding="utf-8"))
 

@@ -1,4 +1,4 @@
-"""Each number of these tables and sentences of the documentation is in the committed rows."""
+"""The tables and sentences of the documentation listed here agree with the committed results."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def rows(files: str) -> list[tuple[str, str]]:
 
 
 def unbacked(text: str, files: str, name: str) -> list[str]:
-    """Return the numbers of a text that no such row contains, rounded to the text's digits."""
+    """Return the numbers of a text that no row with `name` in its name contains, after rounding."""
     found = " ".join(row for row_name, row in rows(files) if name in row_name)
     assert found, f"No row of {files} has {name!r} in its name."
     known = [float(one.replace(",", "")) for one in NUMBER.findall(found)]
@@ -184,7 +184,7 @@ def spelled(cell: str, files: str) -> str:
 
 
 def lines(name: str, header: str) -> Iterator[tuple[str, str, str]]:
-    """Yield the first cell of its line, its column and the text of each cell of a table."""
+    """Yield, for each cell of a table: first cell of its line, header of its column, and text."""
     _, found, text = page(name).partition(
         f"\n| {header.lstrip()}" if header[0] != " " else f"\n|{header}"
     )

@@ -30,7 +30,7 @@ _STEPS = 20
 def test_a_step_calls_few_functions(
     env_id: str, arguments: dict[str, Any], most_calls: int, most_files: int
 ) -> None:
-    """A step makes at most this many Python calls in the package, the mean over 20 steps."""
+    """Calls are Python calls in the package, and their number is the mean over 20 steps."""
     env = gym.make(f"shapechanger/{env_id}-v1", **arguments).unwrapped
     env.reset(seed=0)
     action = np.full(env.action_space.shape, 0.3, env.action_space.dtype)

@@ -121,7 +121,7 @@ def test_the_identity_is_neutral(built: BodyMap) -> None:
 @law
 @given(links=chains(2), seed=st.integers(0, 2**32 - 1))
 def test_a_composed_map_adapts_as_its_links_do(links: list[BodyMap], seed: int) -> None:
-    """Matrices of a chain are products of its links'."""
+    """The matrices of a chain are the products of the matrices of its links."""
     a, b = links
     both = a.then(b)
     rng = np.random.default_rng(seed)
@@ -152,7 +152,7 @@ def test_there_and_back_is_the_identity_where_it_matched(built: BodyMap) -> None
 @law
 @given(built=maps(scales=st.floats(1e-3, 1e3)))
 def test_json_round_trip(built: BodyMap) -> None:
-    """Maps are equal after JSON, including remarks."""
+    """A map that is written as JSON and read again is equal, and so is its table."""
     again = BodyMap.from_json(built.to_json())
     assert again == built
     assert again.table() == built.table()
@@ -161,7 +161,7 @@ def test_json_round_trip(built: BodyMap) -> None:
 @law
 @given(legs=st.integers(1, 4), flip=st.booleans(), order=st.randoms(use_true_random=False))
 def test_a_mirror_is_its_own_inverse(legs: int, flip: bool, order: object) -> None:
-    """Holds for any order of features."""
+    """The order of the features does not matter."""
     names = [f"torso/{q}" for q in ("y", "qw", "qx", "qy", "qz", "vx", "vy", "wx", "wy", "wz")]
     names += [
         f"{joint}_{side}{leg}/{quantity}"

@@ -132,7 +132,7 @@ def test_scores_are_invariant_to_reward_units(
 def test_a_better_arm_never_gains_less(
     difference: Difference, pair: Pair, bonus: float, source: int
 ) -> None:
-    """Monotonicity: a bonus at every evaluation lowers no gain, for both step counts."""
+    """Monotonicity: a bonus at every evaluation lowers no gain, with or without source steps."""
     arm, scratch = pair
     better = LearningCurves(arm.steps, arm.returns + bonus)
     before = value(difference(in_total_steps(arm, source, 0.0), scratch))

@@ -78,7 +78,7 @@ MODELS: list[Callable[[], mujoco.MjSpec]] = [leg, gantry, ant, pendulum]
 def test_edits_of_size_compose_by_multiplication(
     kind: type[Stretch | Radius], body: str, a: float, b: float
 ) -> None:
-    """Two edits equal one by the product of their factors."""
+    """Two edits equal one edit by the product of their factors."""
     once, twice = built(leg(), kind(body, a * b)), built(leg(), kind(body, a), kind(body, b))
     for field in ("body_pos", "geom_pos", "geom_size", "site_pos", "jnt_pos"):
         np.testing.assert_allclose(
@@ -122,7 +122,7 @@ def test_masses_and_inertias_follow_from_geometry(
 @law
 @given(body=BODIES, factor=RATIOS)
 def test_mass_scales_as_density(body: str, factor: float) -> None:
-    """Scaling mass equals scaling density, and keeps the principal axes."""
+    """Scaling the mass equals scaling the density, and keeps the centres of mass."""
     before = built(leg())
     by_mass, by_density = (built(leg(), kind(body, scale=factor)) for kind in (Mass, Density))
     assert differing(by_mass, by_density) == []
@@ -179,7 +179,7 @@ def test_edits_of_different_bodies_commute(edits: tuple[Edit, Edit]) -> None:
     positions=st.fixed_dictionaries({j: SMALL for j in ("x", "yaw", "y", "pitch", "swing")}),
 )
 def test_a_locked_joint_keeps_its_position(lock: str, positions: dict[str, float]) -> None:
-    """Hinges and slides, alone or with other joints of the body."""
+    """The joint is a hinge or a slide, alone or with other joints of its body."""
     free = built(uncoupled_gantry())
     locked = built(uncoupled_gantry(), Lock(lock, positions[lock]))
     others = {joint: at for joint, at in positions.items() if joint != lock}
@@ -297,7 +297,7 @@ def test_edits_round_trip_through_json(kind: type[Edit], data: st.DataObject) ->
 def test_interpolated_bodies_are_valid(
     a: tuple[Edit, ...], b: tuple[Edit, ...], alpha: float
 ) -> None:
-    """Bodies between any two round-trip through JSON; a body and itself have it between them."""
+    """Interpolated bodies round-trip through JSON; between equal bodies is only the same body."""
     assert interpolate(a, b, 0.0) == a == interpolate(a, a, alpha)
     assert interpolate(a, b, 1.0) == b
     between = interpolate(a, b, alpha)

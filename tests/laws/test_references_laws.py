@@ -1,4 +1,4 @@
-"""The law of references: an edit carries along, or refuses, whatever names what it touches."""
+"""Law of references: an edit keeps all references between elements correct, or is refused."""
 
 from __future__ import annotations
 
@@ -74,23 +74,23 @@ _EDITS: dict[type[Edit], st.SearchStrategy[Any]] = {
 @law
 @given(mechanism=_MECHANISMS, data=st.data())
 @pytest.mark.parametrize("kind", _EDITS)
-def test_references_point_to_where_geometry_says(
+def test_references_are_correct_after_an_edit(
     kind: type[Edit], mechanism: Mechanism, data: st.DataObject
 ) -> None:
-    """References are correct after any edit, or the edit is refused with a reason."""
+    """All references are correct after any edit that is not refused."""
     edit = data.draw(_EDITS[kind])
     before = mechanism.spec().compile()
     try:
         after = compile_body(mechanism.spec(), [edit])
     except MorphologyError as error:
-        # MuJoCo compiles whatever an edit lets through.
+        # `BrokenModel` would mean that MuJoCo refuses the edited model.
         assert not isinstance(error, BrokenModel), error  # noqa: PT017
         return
     _Check(before, after, edit).everything()
 
 
 class _Check:
-    """One edit of a mechanism, looked at from each element that names others."""
+    """Check of one edit of a mechanism, for each kind of element that refers to others."""
 
     def __init__(self, before: mujoco.MjModel, after: mujoco.MjModel, edit: Edit) -> None:
         self.before, self.after, self.edit = before, after, edit
@@ -101,7 +101,7 @@ class _Check:
         self.copied = {n.removesuffix("_2") for n in _names(after, "body") if n.endswith("_2")}
 
     def everything(self) -> None:
-        """Look at every kind of reference."""
+        """Check every kind of reference."""
         assert b"~" not in bytes(self.after.names)
         self.pin()
         self.couplings()
@@ -120,7 +120,7 @@ class _Check:
         return name in _names(self.after, kind)
 
     def pin(self) -> None:
-        """Both ends of the pin are where sites at the same places are, and coincide."""
+        """The two ends of the pin coincide, and lie at the sites that mark them."""
         if not self.has("equality", "pin"):
             assert {"coupler", "rocker"} & self.gone
             return
@@ -136,7 +136,7 @@ class _Check:
         np.testing.assert_allclose(first, second, atol=1e-7)
 
     def ends_of(self, name: str) -> dict[str, np.ndarray]:
-        """Return the places of a pin in the world by its bodies."""
+        """Return the place of each end of a pin in the world, keyed by its body."""
         model, data = self.after, self.new
         pin = model.equality(name)
         first, second = int(pin.obj1id[0]), int(pin.obj2id[0])
@@ -154,11 +154,11 @@ class _Check:
         return dict(zip(names, places, strict=True))
 
     def body_of_site(self, site: str) -> str:
-        """Return the body that carries a site in the edited model."""
+        """Return the body of a site in the edited model."""
         return self.after.body(int(self.after.site(site).bodyid[0])).name
 
     def couplings(self) -> None:
-        """The follower is where the leader puts it, also if the leader has been locked."""
+        """The right joint starts where the coupling puts it, also if one of the two is locked."""
         mimic = self.before.equality("mimic").data
         edit = self.edit
         start = {j: self.after.joint(j).qposadr[0] for j in _names(self.after, "joint") if j}
@@ -185,7 +185,7 @@ class _Check:
             assert self.has("equality", "grasp_2")
 
     def tendons(self) -> None:
-        """Paths pass what they passed, and copies what is copied."""
+        """The path of a tendon keeps its elements; the path of its copy has their copies."""
         if self.has("tendon", "rope"):
             assert _path(self.after, "rope") == _path(self.before, "rope")
         else:
@@ -245,7 +245,7 @@ class _Check:
                 assert geom in paired
 
     def views(self) -> None:
-        """Cameras and lights are where sites at the same places are, and aim at what they did."""
+        """Camera and light stay at the sites that mark them, and the camera keeps its target."""
         if "coupler" in self.gone:
             return
         np.testing.assert_allclose(
@@ -282,7 +282,7 @@ class _Check:
                 np.testing.assert_array_equal(new[at : at + size], expected)
 
     def fitted_geom(self) -> None:
-        """The capsule that is fitted to a mesh is as large as its body says."""
+        """Only an edit of its body changes the size of the capsule that is fitted to a mesh."""
         if not self.has("geom", "shell"):
             assert "rocker" in self.gone or isinstance(self.edit, Cut)
             return
@@ -297,7 +297,7 @@ class _Check:
             np.testing.assert_allclose(new, old, rtol=1e-9)
 
     def skin(self) -> None:
-        """A skin has no physical effect, so it prevents no edit."""
+        """An edit of the shape of a body removes the skin over it, which has no physical effect."""
         shaped = isinstance(self.edit, Stretch | Radius | Cut | Remove | Split)
         over = getattr(self.edit, "body", "") in ("left", "right")
         assert self.after.nskin == (0 if shaped and over else 1)
