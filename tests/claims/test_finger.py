@@ -69,7 +69,7 @@ def test_the_shipped_policy_follows() -> None:
 
 
 def test_the_gap_halves_the_success() -> None:
-    """On real-like fingers, the shipped policy keeps less than half of its success."""
+    """On real-like fingers, the shipped policy reaches fewer than half of the targets."""
     act = _Policy(load_policy(POLICIES["reach"]))
     infos: list[dict[str, Any]] = []
     for finger in range(3):

@@ -297,7 +297,7 @@ def test_edits_round_trip_through_json(kind: type[Edit], data: st.DataObject) ->
 def test_interpolated_bodies_are_valid(
     a: tuple[Edit, ...], b: tuple[Edit, ...], alpha: float
 ) -> None:
-    """Interpolated bodies round-trip through JSON; between equal bodies is only the same body."""
+    """Interpolated bodies round-trip through JSON; interpolating a body with itself returns it."""
     assert interpolate(a, b, 0.0) == a == interpolate(a, a, alpha)
     assert interpolate(a, b, 1.0) == b
     between = interpolate(a, b, alpha)

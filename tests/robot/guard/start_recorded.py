@@ -1,8 +1,7 @@
-"""Start the guard or the supervisor as `robot/guard/start.py` does, on the pins of `recording.py`.
+"""Start the guard or the supervisor like `robot/guard/start.py`, but able to import `recording.py`.
 
 The arguments are the path of `start.py`, the program, and its arguments. Isolated mode ignores
-PYTHONPATH, so the repository, which has `recording.py`, is added to the path. `stand_in.py` is
-the daemon.
+PYTHONPATH, so the repository is added to the path here. `stand_in.py` replaces the daemon.
 """
 
 import runpy

@@ -68,7 +68,7 @@ def probed_pin(plan: GuardPlan, probe: int) -> int:
             return int(output.settings["forward" if weight > 0 else "backward"])
         if weight and output.driver == "phase_enable":
             return int(output.settings["enable"])
-    raise RobotError("A probe needs a motor on an H-bridge: pulses of a servo go on at rest.")
+    raise RobotError("A probe needs a motor on an H-bridge: a servo gets pulses at rest, too.")
 
 
 def check_jumper(output: int, sensed: int, plan: GuardPlan) -> str:

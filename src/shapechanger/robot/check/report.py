@@ -140,5 +140,5 @@ def write_report(
         raise
     tell(f"\n{counts['good']} good, {counts['bad']} bad, {counts['unknown']} not measured.")
     if path is not None:
-        say(f"wrote {path}: it holds no key, no network and no name of this computer")
+        say(f"wrote {path}: it contains no key, no network and no name of this computer")
     return not counts["bad"]

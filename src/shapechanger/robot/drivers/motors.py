@@ -48,7 +48,7 @@ class HBridgeKeys(_DutyKeys, frozen=True, kw_only=True):
     Attributes:
         forward: Input for forward or right.
         backward: Input for backward or left.
-        enable: Input that enables both; -1 for none.
+        enable: Input that enables the bridge; -1 for none.
     """
 
     forward: Pin
@@ -82,7 +82,7 @@ class _DutyMotor:
     """Bidirectional motor on two pins; see `OutputDriver`.
 
     `hz` maps each pin to the frequency of its PWM, Hz, 0 for a plain output. Its last two pins are
-    the inputs of the motor; a pin before them enables both.
+    the inputs of the motor; a pin before them enables the motor.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware, hz: Mapping[Pin, int]) -> None:
@@ -144,7 +144,7 @@ class HBridge(_DutyMotor):
 
     One input turns the motor forward, the other backward, each with PWM. They are never on
     together: one is turned off before the other is turned on, and on a Pi `LowAtOncePin` makes that
-    immediate. Some boards have a third input that enables both. A released motor coasts.
+    immediate. Some boards have a third input that enables the bridge. A released motor coasts.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:

@@ -136,7 +136,7 @@ class Pca9685(I2cDevice):
         with ExitStack() as stack:
             stack.callback(self._write, channel, _FULL)
             if not self._sends():
-                self._switch(False)  # First, because a hanging bus takes a second to fail.
+                self._switch(False)  # Before `_write`: a hanging bus takes a second to fail.
 
     def leave(self, channel: int) -> None:
         """Remove a channel; removing the last one closes the chip."""
