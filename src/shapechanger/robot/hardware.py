@@ -55,7 +55,7 @@ class Clock:
         """Let a call to the hardware send heartbeats while a twin's board is delayed.
 
         `beat` sends a heartbeat if it is due. On a robot this has no effect: a guard that hangs in
-        a bus is silent, and must be replaced.
+        a call of a bus must send no heartbeats, so that it is replaced.
         """
 
     async def sleep(self, seconds: float) -> int | None:

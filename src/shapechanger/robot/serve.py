@@ -148,8 +148,8 @@ class Service:
     def make_known(self, name: str, plan: ServePlan, port: int) -> str:
         """Store a twin as a known robot; return a message about it, or "" if it is not stored.
 
-        A twin without TLS is not stored, nor one with other credentials at a port that the system
-        chose.
+        A twin is not stored if it has no TLS, or if `credentials` is given and the system chose
+        the port.
         """
         if self.insecure or (self.credentials is not None and not self.port):
             return ""

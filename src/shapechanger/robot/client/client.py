@@ -47,7 +47,7 @@ class RobotClient(Inbox):
 
     Attributes:
         welcome: Description of the robot.
-        pace: Whether the clocks or the client set the pace.
+        pace: "realtime", or "lockstep" if the robot waits for each command of the client.
     """
 
     def __init__(self, robot: KnownRobot, hello: Hello, timeout_s: float) -> None:
@@ -91,7 +91,7 @@ class RobotClient(Inbox):
             fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
             role: Whether a person or a program drives.
             name: Display name of the client; user and host by default.
-            pace: Whether the clocks or the client set the pace.
+            pace: "realtime"; or "lockstep": the robot waits for each command of the client.
             frames: Whether observations contain frames.
             timeout_s: Time limit of the handshake, and of silence before the link is lost, s.
 
@@ -135,7 +135,7 @@ class RobotClient(Inbox):
             raise RobotRefused(lease.reason or f"{lease.holder or 'Another client'} has control.")
 
     def arm(self) -> None:
-        """Let the outputs move; from a person this also ends an emergency stop seen before.
+        """Let the outputs move; a person's client also ends an emergency stop that it has seen.
 
         Raises:
             RobotRefused: If the robot refuses, or is not armed in time.
@@ -389,7 +389,7 @@ class RobotClient(Inbox):
             self.put(message)
 
     async def _watch(self) -> None:
-        """End a silent connection: if the radio fails, the connection is never closed."""
+        """End a silent connection: if the radio fails, the robot's side cannot close it."""
         loop, limit_s = asyncio.get_running_loop(), self._settings[2]
         while (silent_s := loop.time() - self._heard_at) <= limit_s:
             if silent_s > _PING_AFTER * limit_s:

@@ -170,7 +170,7 @@ class Inbox:
 
     @property
     def recorder(self) -> messages.RecorderState | None:
-        """Last reported state of the robot's recorder; None before the first."""
+        """Last reported state of the robot's recorder; None before the first report."""
         return self.said(messages.RecorderState)
 
     def put(self, message: messages.RobotMessage) -> None:

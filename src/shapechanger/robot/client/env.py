@@ -31,7 +31,7 @@ LATE: Final = 0.5
 _WAYS_TO_RESET: Final = ("operator", "person", "routine")
 _LOCKSTEP_S: Final = 10.0  # Time limit of a step in lockstep, where a robot waits for the env.
 _NS_PER_S: Final = 1e9
-# Names of each quantity of the reward in the state; the first one that is measured counts.
+# Features of the state that may measure each quantity of the reward; the first measured one counts.
 _QUANTITIES: Final = {"speed": ("speed",), "collision": ("collision", "bump"), "stall": ("stall",)}
 
 
@@ -83,13 +83,13 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         size: Width and height of the images, pixels, such as (128, 128) in the original release;
             see `resize_picture`. None for the camera's size.
         state: Whether observations have the state in addition to the image.
-        image: Whether observations have an image; None if the robot has a camera.
+        image: Whether observations have an image; by default, if the robot has a camera.
         pace: "realtime": a step lasts one control period of the robot; "lockstep": the robot waits
             for each command and answers one period later.
         reward: Weights that replace the profile's, keyed by name.
         on_reset: "operator": a person puts the robot back and arms it; if anyone may arm it, the
-            env arms it at once. "person": always a person. "routine": the reset routine of the
-            profile. A function is called with the seed.
+            env arms it at once. "person": only a person arms it. "routine": the reset routine of
+            the profile. A function is called with the seed.
         on_waiting: Called with a sentence that describes what a reset waits for; None for a warning
             in the log of `shapechanger.robot.client.operator`.
         reset_timeout_s: Time limit of a reset, s.

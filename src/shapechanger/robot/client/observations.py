@@ -26,7 +26,7 @@ _BRIGHTEST: Final = 255
 def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
     """Resize an image to width and height, pixels; return it as it is if it has this size.
 
-    If width and height shrink by whole numbers, each pixel is the rounded mean of its box.
+    If width and height shrink by integer factors, each pixel is the rounded mean of its box.
     Otherwise each pixel is the nearest pixel of the original. Nothing is cropped, so a change of
     proportions stretches the image.
     """

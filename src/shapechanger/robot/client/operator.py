@@ -73,7 +73,7 @@ class Preparation:
         while True:
             seen = robot.ask().message
             if not seen.mine and self._left_s >= 0.0:
-                # A person has control, and gives it back to arm the robot for the program.
+                # A person who arms the robot for the program first gives control back.
                 self.take(robot)
                 continue
             if seen.mine and seen.armed and not seen.emergency:

@@ -59,7 +59,7 @@ def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[Episo
 
 
 def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
-    """Download one episode, or its new part; count the new lines, and the edits made here.
+    """Download an episode, or its new part; return the numbers of new lines and of local edits.
 
     An incomplete episode is kept in a folder that readers ignore. Marks and edits from this machine
     are placed after the robot's, so that they take precedence.
@@ -130,7 +130,7 @@ def _complete_lines(folder: Path, file: io.FileIO) -> list[bytes]:
 
 
 def _kept(piece: Piece, frames: Path) -> list[bytes]:
-    """Check the lines of a piece, write their frames, and return them."""
+    """Check the lines of a piece, write their frames, and return the lines."""
     lines = [line.encode() + b"\n" for line in piece.lines]
     if len(piece.frames) != len(lines):
         raise DemosError(f"The robot sent {len(piece.frames)} images for {len(lines)} lines.")

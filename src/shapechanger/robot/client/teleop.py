@@ -137,7 +137,7 @@ class NoTerminal(ShapechangerError, RuntimeError):
 
 
 def _is_whole(text: str) -> bool:
-    """Return whether a sequence, from its escape character on, has its last character."""
+    """Return whether a sequence is complete; it includes its escape character."""
     kind, rest = text[1:2], text[2:]
     if not text.startswith(_ESCAPE):  # A character of another encoding.
         return bool(kind)

@@ -26,7 +26,7 @@ export class Actions {
     setText(find("pad-info"), "");
   }
 
-  /** Show the command of the person on the stick, from any device. */
+  /** Show the person's command, from any device, on the stick. */
   showAsked() {
     const { steering, throttle } = this.#pilot.asked;
     place(this.#knob, steering, throttle);

@@ -27,7 +27,7 @@ class Writer {
   #view = new DataView(this.#buffer.buffer);
   #length = 0;
 
-  /** Make room for `size` more bytes; returns their offset. */
+  /** Make room for `count` more bytes; returns their offset. */
   #room(count) {
     const at = this.#length;
     this.#length += count;

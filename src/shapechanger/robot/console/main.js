@@ -198,7 +198,7 @@ function showTilt() {
 }
 
 for (const id of ["stop", "episodes-stop"]) {
-  // A finger on STOP stops the robot before it is lifted.
+  // STOP acts when it is pressed, not when the finger is lifted.
   let downMs = -Infinity;
   find(id).addEventListener("pointerdown", () => {
     downMs = performance.now();

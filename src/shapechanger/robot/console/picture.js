@@ -1,4 +1,4 @@
-// Live picture. A JPEG that arrives while another is decoded waits, and replaces one that waits.
+// Live picture. While a JPEG is decoded, the newest later JPEG waits, and older ones are dropped.
 
 import { msBetween } from "./layout.js";
 

@@ -59,7 +59,7 @@ export class Pilot {
   values(scale) {
     const { asked } = this;
     return this.#features.map(({ name, low, high }, index) => {
-      // Values without a cap are divided by it, because the robot multiplies all values.
+      // The cap does not apply to sliders: divide by the scale, which the robot multiplies by.
       if (Pilot.hasSlider(name)) return this.held(index) / scale;
       const value = asked[name];
       const most = value < 0 ? -low : high;

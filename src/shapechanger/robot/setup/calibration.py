@@ -20,8 +20,8 @@ from shapechanger.robot.drivers.servos.settings import DRIVER, BusSettings, bus_
 from shapechanger.robot.guard.outputs import Switches
 from shapechanger.robot.hardware import Hardware
 
-# A servo must not be driven against its stop while it is jogged. Makers state 500 to 2500 us as the
-# full range of standard servos, and 900 to 2100 us as the range that most of them reach.
+# Widest pulses while a servo is jogged, us, so that it is not driven far against its stop. Makers
+# state 500 to 2500 us as the full range of standard servos; most of them reach 900 to 2100 us.
 _WIDEST_US: Final = (600, 2400)
 
 
@@ -40,7 +40,7 @@ def reading(output: OutputPlan, value: float) -> str:
 
 
 def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
-    """Return a jogged output's changes of the profile: pulse widths, us, keyed by dotted name.
+    """Return the changes of the profile for a jogged output: pulse widths, us, by dotted name.
 
     `found` contains the values of the low end, middle and high end, -1 to 1.
     """
@@ -57,7 +57,7 @@ def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
 def motor_changes(
     output: OutputPlan, went: Literal["forward", "backward"], starts_at: float
 ) -> dict[str, Any]:
-    """Return a motor's changes of the profile, keyed by dotted name.
+    """Return the changes of the profile for a motor, keyed by dotted name.
 
     With a forward command the motor turned in the direction `went`, and it started to turn at a
     duty of `starts_at`, 0 to 1.
@@ -74,7 +74,7 @@ def motor_changes(
 
 
 def wheel_changes(sensor: str, wheel_m: float, measured_m: float) -> dict[str, float]:
-    """Return an encoder's changes of the profile, after the robot was pushed forward by 1 m.
+    """Return the changes of the profile for an encoder, after the robot was pushed forward by 1 m.
 
     The profile states `wheel_m` per turn. The encoder measured `measured_m`, negative for backward.
     """

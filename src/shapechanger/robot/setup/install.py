@@ -1,7 +1,7 @@
 """Install a robot on a Raspberry Pi: its service, its user's groups and its interfaces.
 
-Every change is checked before it is made, so a second run has no effect, and afterwards, so that
-commands without an effect are reported. Commands run as root, by one function that tests replace.
+Every change is checked before it is made, so that a second run has no effect, and again afterwards,
+to report commands without an effect. One function, which tests replace, runs commands as root.
 """
 
 from __future__ import annotations

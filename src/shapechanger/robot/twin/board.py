@@ -140,7 +140,7 @@ class Board:
         return _LATER
 
     def sleep(self, caller: BoardConnection, ns: int) -> object:
-        """Let a client sleep for `ns` nanoseconds of twin time, which ends with a `Slept`."""
+        """Refuse, because a board in real time cannot advance its clock."""
         raise RobotError("This board runs in real time, which cannot be advanced.")
 
     def _serve(self, timeout_s: float | None) -> None:

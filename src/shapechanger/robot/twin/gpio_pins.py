@@ -61,7 +61,7 @@ class TwinPin(PiPin):
     def _get_state(self) -> float:
         if self._function == "output":
             return self._duty
-        if self._board.clock == "real":  # In twin time, levels change only at a grant.
+        if self._board.clock == "real":  # In twin time, levels change only during waits.
             self._board.wait()
         return self._board.levels[self._number]
 

@@ -77,7 +77,7 @@ class Operator:
     """
 
     _client: BoardClient
-    _board: PinBoard  # In the board's process.
+    _board: PinBoard  # Set only in the board's process.
 
     def __init__(self, path: str) -> None:
         self._client = BoardClient(path, "operator")

@@ -90,7 +90,7 @@ class PinBoard:
         if servos := [output for output in plan.outputs if output.driver == DRIVER]:
             settings = bus_settings(servos)
             self._rig = Rig(settings, world)
-            # Without watchdogs, the power of the servos comes from the enable line.
+            # The enable line switches the power of servos that have no watchdogs.
             self._switches_rig = not settings.family.has_watchdog
             self._rig.set_power(on=not self._switches_rig)
         obeys = ((one, OUTPUTS[one.driver].obeys) for one in plan.outputs)
@@ -159,7 +159,7 @@ class PinBoard:
         pull: str,
         level: int,
     ) -> int:
-        """Claim a pin and return its level. Sensors, pulls and resistors set that of an input."""
+        """Claim a pin and return its level; sensors, pulls and resistors set an input's level."""
         claim = self._claims.setdefault(pin, _Claim())
         if claim.owner is not None and claim.owner is not caller:
             raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")

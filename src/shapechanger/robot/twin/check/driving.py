@@ -1,4 +1,4 @@
-"""Checks that drive a robot as a person: it must obey commands, and stop for every reason."""
+"""Checks that drive a robot: it must obey, and stop after silence, stop commands and a crash."""
 
 from __future__ import annotations
 
