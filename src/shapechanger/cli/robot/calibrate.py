@@ -84,7 +84,7 @@ _START_STEP: Final = 0.05
 # Largest difference between a requested and an applied value, and time to wait for it.
 _THERE: Final = 0.07
 _SETTLES_S: Final = 4.0
-_STOP_LOOKS: Final = 50  # Observations within which an emergency stop must be visible.
+_STOP_LOOKS: Final = 50  # Most observations to wait for until the robot reports that it stopped.
 
 
 class _Ended(Exception):
@@ -123,7 +123,7 @@ class Calibration:
         widest = widest_pulses(output)
         wide = replace(output, settings={**output.settings, **widest})
         names = {"servo": ("full left", "straight", "full right")}.get(
-            output.driver, ("its fastest backward", "surely at rest", "its fastest forward")
+            output.driver, ("at its fastest backward", "surely at rest", "at its fastest forward")
         )
         say(f"\n{output.name}: A and D move it, Enter when it is …")
         found: list[float] = []
@@ -146,7 +146,7 @@ class Calibration:
             value = self._jogged(robot, output, self.cap, _START_STEP)
         if not value:
             return {}
-        say("  … did it go forward, or right? Y or N")
+        say("  … did it move in the positive direction, forward or to the right? Y or N")
         while True:
             for key in self._pressed(1.0):  # The robot is not served here, so it is at rest.
                 if key in {"y", "n"}:
