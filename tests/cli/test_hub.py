@@ -296,8 +296,8 @@ class FakeHub(ThreadingHTTPServer):
         self.repositories: dict[str, Repository] = {}  # Keyed by name, such as "models/ada/ant".
         self.requests: list[str] = []  # Methods and paths.
         self.cut: dict[str, int] = {}  # Bytes after which the transfer of a file ends.
-        self.stalled: set[str] = set()  # Files whose transfers stop half-way until the server ends.
-        self.stalling = threading.Event()  # Set while such a transfer is under way.
+        self.stalled: set[str] = set()  # Files whose transfers stop half-way until `released`.
+        self.stalling = threading.Event()  # Set once such a transfer has stopped.
         self.released = threading.Event()
 
     @property

@@ -88,7 +88,7 @@ def test_a_missing_pygame_gives_one_sentence(tmp_path: os.PathLike[str]) -> None
 
 
 @pytest.mark.system
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Here no disk is always full.")
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="This system has no /dev/full.")
 def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
     """There is no traceback, neither on write nor at the exit of the interpreter."""
     code = COMMAND.format(arguments=["robot", "check", "car", "--wiring", "--port", "0"])
@@ -171,7 +171,7 @@ def test_a_terminal_shows_a_bar_with_the_time_left() -> None:
     assert "\x1b" in shown
 
 
-def test_without_a_terminal_it_prints_lines() -> None:
+def test_without_a_terminal_progress_is_printed_as_lines() -> None:
     file = io.StringIO()
     with StudyProgress({"[/x]": 100, "b": 300}, Console(file=file, markup=False)) as progress:
         progress("[/x]", 100, True)

@@ -1,4 +1,4 @@
-"""`shapechanger policies`: cards, and conversion of Stable-Baselines3 files."""
+"""`shapechanger policies`: show, list, convert, evaluate, play and export."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def test_a_policy_is_trained_in_drawn_bodies(policy: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_policy_is_trained_on_a_gpu(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rsl_ppo_trains_a_limb_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In many bodies, `rsl-ppo` trains a limb policy, which also acts in other bodies."""
     out = tmp_path / "ants.safetensors"
     of_two = ["train", "Ant", "--bodies", "2", "--learner", "rsl-ppo", "--steps", "48"]
@@ -238,7 +238,7 @@ def test_a_policy_does_not_fit_another_family(command: str, policy: Path, cli: C
     assert "another family than" in cli.refused("policies", *words, *out)
 
 
-def test_other_policies_are_exported_for_their_own_body(tmp_path: Path, cli: Cli) -> None:
+def test_only_limb_policies_are_exported_for_another_body(tmp_path: Path, cli: Cli) -> None:
     export = ("policies", "export", POLICIES["reach"], "--env", "Finger")
     answer = cli.refused(*export, "--out", tmp_path / "finger.onnx")
     assert "Only a limb policy can be exported for another body" in answer

@@ -33,7 +33,7 @@ _PAIRS += [f"{a}-to-{b}" for a, b in (("Wet", "Icy"), ("Icy", "Dry"), ("Icy", "W
 
 
 class _Counting(Serial):
-    """Executor that records the names of jobs, and raises Ctrl-C after a number of jobs, if any."""
+    """Executor that records the names of jobs, and raises Ctrl-C after `stops_after` jobs."""
 
     def __init__(self, stops_after: int | None = None) -> None:
         self.done: list[str] = []
@@ -158,7 +158,7 @@ def test_folders_of_two_machines_are_merged(
     for part, names in parts.items():
         for name in names:
             shutil.copytree(whole / name, tmp_path / part / name)
-    # Intermediate results were computed.
+    # The results of this study were also computed before it ended, from 4 and 2 seeds.
     study = tmp_path / "a" / _PAIRS[0] / "study.json"
     study.write_text(json.dumps({**json.loads(study.read_text()), "looks": [4, 2]}))
     # The other machine had been stopped in one of its studies.

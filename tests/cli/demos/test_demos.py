@@ -1,4 +1,4 @@
-"""`shapechanger demos`: list, show, cut, bad, good, mark, merge, repair."""
+"""`shapechanger demos`: edit, share, replay and record recordings, and learn from them."""
 
 from __future__ import annotations
 
@@ -313,7 +313,7 @@ def test_export_prints_a_summary_and_how_to_load(
     assert "5 steps of 1 episode\n" in capsys.readouterr().out
 
 
-def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_export_to_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     edit(drive(tmp_path / "data"), Drop(0, 0, "bad"))
     DemosExport(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
     output = capsys.readouterr().out

@@ -113,7 +113,7 @@ LAYOUT = {"features": [{"name": "x", "unit": "1", "shape": [10**6, 10**6]}]}
 
 
 def test_a_picture_of_many_scans_is_refused() -> None:
-    """Decoding each scan takes as long as an image, and a few bytes can add thousands of scans."""
+    """Each scan takes as long to decode as an image, and few bytes can add thousands of scans."""
     jpeg = picture(0)
     start = jpeg.index(b"\xff\xda")
     with pytest.raises(DemosError, match="more than 64 scans"):

@@ -52,7 +52,7 @@ def person(episode: Path, folder: Path) -> Person:
     return Person(arguments, folder, {"XDG_CONFIG_HOME": str(folder)})
 
 
-def test_a_policy_plays_after_arming(robot: RunningRobot, tmp_path: Path) -> None:
+def test_an_episode_plays_after_arming(robot: RunningRobot, tmp_path: Path) -> None:
     """The robot does not move before E; at the end it is at rest and disarmed."""
     episode = forward(tmp_path, robot, 0.6)
     with robot.operator() as operator, person(episode, tmp_path) as terminal:

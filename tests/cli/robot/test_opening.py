@@ -32,7 +32,8 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     script.write_text(_BROWSER)
     monkeypatch.setenv("BROWSER", f"{sys.executable} {script} {out} %s")
     monkeypatch.setenv("DISPLAY", ":99")
-    # The page is read when the fake browser exits; not every file system reports the access.
+    # The command waits for a new access time of the page, which not every file system records. Wait
+    # briefly, because the fake browser has read the page before it exits.
     monkeypatch.setattr(opening, "_OPENED_WITHIN_S", 0.1)
     return out
 

@@ -133,7 +133,7 @@ def test_install_reports_each_change(pi: FakePi, car: Profile, said: Said) -> No
 
 
 def test_a_dry_run_needs_the_unit_only(pi: FakePi, said: Said) -> None:
-    """A dry run writes no file, so the unit must have been written by `init`."""
+    """A dry run writes no file, so the unit next to the profile must exist."""
     with pytest.raises(RobotError, match="without --dry-run, this command writes it"):
         said(dry_run=True)
     said()

@@ -120,7 +120,7 @@ MISTAKES = (
 
 
 @pytest.mark.parametrize(("command", "text"), MISTAKES)
-def test_one_sentence(
+def test_a_mistake_gives_one_sentence(
     robot: Cli, home: Path, monkeypatch: pytest.MonkeyPatch, command: str, text: str
 ) -> None:
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
@@ -138,7 +138,7 @@ def test_remember_requires_the_key(robot: Cli) -> None:
     assert "SHAPECHANGER_KEY" in robot.refused(*command)
 
 
-def test_a_port_in_use(robot: Cli, home: Path) -> None:
+def test_a_port_in_use_is_refused(robot: Cli, home: Path) -> None:
     path = write_ready_profile(home)
     before = files(home / "work")
     with socket.create_server(("127.0.0.1", 0)) as other:
@@ -147,7 +147,7 @@ def test_a_port_in_use(robot: Cli, home: Path) -> None:
     assert files(home / "work") == before
 
 
-def test_a_twin_on_another_clock(robot: Cli, home: Path) -> None:
+def test_a_twin_on_another_clock_is_refused(robot: Cli, home: Path) -> None:
     path, folder = write_ready_profile(home), home / "work" / "twin"
     folder.mkdir()
     with start_board(load_profile(path).guard_plan(), "real", folder):
