@@ -124,7 +124,7 @@ def test_missing_safety_hardware_is_reported(tmp_path: Path, car: Profile) -> No
 
 
 def _hardware(where: str = "", act: Any = None) -> Any:
-    """Return hardware without pins and buses, and a camera; the method `where` calls `act`."""
+    """Return hardware with a camera, without pins and buses; the method `where` calls `act`."""
     made = MagicMock(clock=Clock())
     for name in ("pin_factory", "i2c", "servo_port"):
         getattr(made, name).side_effect = RobotError("Not here.")
@@ -204,7 +204,7 @@ def test_all_findings_of_a_well_wired_car_are_good(car: Profile) -> None:
     assert not any(board.pins.levels.duties.get(pin) for pin in (4, 17, 22, 27, 19))
 
 
-def test_without_the_supply_off_no_output_is_touched(car: Profile) -> None:
+def test_while_the_supply_may_be_on_no_output_is_touched(car: Profile) -> None:
     """While the motors have a supply, a motor without its resistor could start."""
     board = _board(car)
     level, sentence = _wired(car, board.hardware, motors_off=False)["resistors"][0]

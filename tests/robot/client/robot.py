@@ -21,8 +21,8 @@ from shapechanger.robot.daemon.credentials import Credentials, make_credentials
 from shapechanger.robot.link import messages as m
 from shapechanger.robot.link.authentication import is_proof, new_key, new_nonce, parse_key
 
-FULL_SPEED = 2.0  # m/s at a throttle of 1.
-WALL = 1.5  # m ahead of the start.
+FULL_SPEED = 2.0  # Speed at a throttle of 1, m/s.
+WALL = 1.5  # Distance from the start to the wall, m.
 
 STEERING = Feature("steering", "1", -1.0, 1.0, Element("actuator", "steering"))
 THROTTLE = Feature("throttle", "1", -1.0, 1.0, Element("actuator", "throttle"))
@@ -35,7 +35,7 @@ STATE = (
 
 
 def observation(**fields: Any) -> m.Observation:
-    """Return an observation in which all other fields are empty."""
+    """Return an observation; all fields that are not given are empty."""
     empty: dict[str, Any] = {
         name: 0 for name in m.Observation.__struct_fields__ if name.endswith(("seq", "_ns"))
     }

@@ -62,7 +62,7 @@ def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Conne
     ("version", "changes", "text"),
     [
         (m.VERSION, {"key": new_key()}, "Wrong key"),
-        # Plain, at a robot that encrypts.
+        # A client without encryption, at a robot that encrypts.
         (m.VERSION, {"key": "", "fingerprint": "insecure"}, "No robot answers"),
         (0, {}, "on the robot"),
         (2, {}, "on the workstation"),

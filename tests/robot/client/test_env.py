@@ -160,7 +160,7 @@ def test_the_measurable_latencies_are_reported(run: Run, started: Made, clock: s
     env = started(robot)
     latency = env.step(AHEAD)[-1]["latency"]
     known = {"capture_to_send", "observation_age_at_action", "command_to_pin"}
-    # No round trip is known across two clocks.
+    # If the robot's time is a twin's, the round trip in real time is unknown.
     assert set(latency) == known | ({"round_trip"} if clock == "real" else set())
     assert 0.0 < latency.get("round_trip", 1.0) < 5.0
     robot.refusal = "It is too old."

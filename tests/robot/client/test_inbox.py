@@ -1,4 +1,4 @@
-"""The inbox between the receiving thread and callers, and when the next step begins."""
+"""The inbox between the receiving thread and callers, and the time at which a step begins."""
 
 import pytest
 from hypothesis import given

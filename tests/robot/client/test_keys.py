@@ -67,8 +67,8 @@ UNKNOWN = (
     b"\x90wasdep\xc2\x9c",
     b"\xc2\x9b1;5D",
     b"\xc2\x9d0;wasdep\x07",
-    # Characters, control characters and other encodings: e with an accent, W in Cyrillic, "e" as
-    # the second byte of Shift JIS and GBK.
+    # Characters, control characters and other encodings: e with an accent, the Cyrillic letter on
+    # the key W, an emoji, and "e" as the second byte of a character in Shift JIS and GBK.
     "\N{LATIN SMALL LETTER E WITH ACUTE}".encode(),
     "\N{CYRILLIC SMALL LETTER TSE}".encode(),
     "\N{AUTOMOBILE}".encode(),
@@ -108,7 +108,7 @@ def test_direction_keys_move_their_action(key: str, meaning: tuple[str, float]) 
         ([("w", 0.0), ("w", 0.03)], FIRST_HOLD_S, 1.0, 0.0),
         # The opposite key takes over at once.
         ([("w", 0.0), ("s", 0.1)], 0.1, -1.0, 0.0),
-        # A held key continues when another one is pressed, which does not extend its hold.
+        # When another key is pressed, a held key continues for FIRST_HOLD_S after its last repeat.
         ([*W_FOR_1_S, ("a", LAST_S + 0.02)], LAST_S + FIRST_HOLD_S, 1.0, -1.0),
         ([*W_FOR_1_S, *A_FOR_2_S], LAST_S + FIRST_HOLD_S + JUST, 0.0, -1.0),
         # Another key does not revive an expired one.

@@ -1,4 +1,4 @@
-"""The client and the remote env against the real daemon, with a fake guard and camera."""
+"""The client against the real daemon, with a fake guard and camera."""
 
 from __future__ import annotations
 

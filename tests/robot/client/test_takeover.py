@@ -64,7 +64,7 @@ def test_a_person_takes_over_and_gives_back(tmp_path: Path) -> None:
         assert "intervene_action" not in info
 
 
-def test_an_emergency_stop_ends_a_lent_episode() -> None:
+def test_an_emergency_stop_ends_a_takeover() -> None:
     takeover = Takeover(allowed=True)
     assert takeover.goes_on(observation(holder="Ada", holder_role="person"))
     stopped = observation(holder="Ada", holder_role="person", emergency=True)

@@ -1,4 +1,4 @@
-"""Inputs that must not drive: with layouts, modifiers, focus, gamepads and lost releases."""
+"""Keys, gamepads and the stick must not drive by mistake, for example after a lost release."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, Final
@@ -186,7 +186,7 @@ def test_held_keys_are_released_with_modifiers_and_the_focus(person: Input) -> N
 
 
 def test_combinations_and_input_methods_do_not_drive(person: Input) -> None:
-    """Keys in a list do not drive either; a held Enter presses a button once."""
+    """Keys in a focused drop-down list do not drive either; a held Enter presses a button once."""
     for modifier in (1, 2, 4):
         for code, key in zip(_PLACES, LAYOUTS["QWERTY"].split(), strict=True):
             person.tap(code, key, modifiers=modifier, commands=[])

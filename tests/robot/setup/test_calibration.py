@@ -54,7 +54,7 @@ def test_impossible_measurements_are_refused() -> None:
 
 
 def test_motors_and_wheels_get_the_measured_settings() -> None:
-    """A motor that turned backward gets a negative mix; 0.5 m for 1 m doubles a wheel's turn."""
+    """A motor that turned backward gets a negative mix; 0.5 m for 1 m doubles `wheel_m`."""
     assert motor_changes(_MOTOR, "forward", 0.214) == {"output.drive.start": 0.21}
     assert motor_changes(_MOTOR, "backward", 0.2)["output.drive.mix"] == {"throttle": -0.6}
     assert wheel_changes("wheel", 0.21, 0.5) == {"sensor.wheel.wheel_m": 0.42}

@@ -85,7 +85,7 @@ def test_a_request_waits_while_the_socket_is_full(tmp_path: Path) -> None:
 def test_a_board_that_never_replies_ends_the_heartbeats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The call fails without a heartbeat, so that the supervisor detects the silent guard."""
+    """After the time limit, no heartbeat is sent, so that the supervisor detects the silence."""
     monkeypatch.setattr(rpc, "_PATIENCE_S", 0.0)
     client, board = _connected(tmp_path)
     client.while_held_up = lambda: pytest.fail("a beat for a broken board")

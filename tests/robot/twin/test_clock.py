@@ -34,8 +34,8 @@ def test_time_does_not_wait_for_a_dead_participant(tmp_path: Path) -> None:
         assert operator.advance(1.0) == before + 1_000_000_000
 
 
-def test_a_wait_without_a_grant_returns(tmp_path: Path) -> None:
-    """`wait` returns without a grant, so that a guard can send heartbeats while time is stopped."""
+def test_a_wait_ends_although_time_stands_still(tmp_path: Path) -> None:
+    """`wait` returns False after its time limit, so that a guard can send heartbeats."""
     with start_board(CAR, "twin", tmp_path) as board:
         hardware = connect(board.socket_path)
         clock = hardware.clock

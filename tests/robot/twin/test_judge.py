@@ -30,7 +30,7 @@ def _pin(ms: float, pin: int, duty: float) -> Transition:
 
 
 def test_driving_without_permission_is_found() -> None:
-    """An output that never returns to rest moves to infinity; steering needs no permission."""
+    """The motion of an output that never comes to rest has no end; steering needs no permission."""
     for pin, sign in ((22, 1), (27, -1)):
         ledger = [_pin(10, pin, 0.5), _pin(11, pin, 0.0)]
         assert unauthorised(ledger, _NO_ONE_SHOT, [(9 * _MS, 250 * _MS)]) == []

@@ -1,4 +1,4 @@
-"""Rig of a finger: real guard and drivers on a twin, with each of both families of servos."""
+"""Rig of a finger: real guard and drivers on a twin, with servos of each family."""
 
 import contextlib
 import re
@@ -121,7 +121,7 @@ def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench, family: str
     ],
 )
 def test_a_failed_servo_stops_all(bench: _Bench, family: str, how: str, text: str) -> None:
-    """All servos release, also one that gets no packets, until a person has armed the robot."""
+    """All servos, also one that gets no packets, stay released until a person arms the robot."""
     bench.drive(_FLEX, 25)
     bench.rig.break_servo("FDS", how)
     bench.drive(_FLEX, 80)
