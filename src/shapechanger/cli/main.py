@@ -140,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt as stop:  # The message of `Interrupted` explains how to resume.
         _stop(str(stop) or "Stopped.", _INTERRUPTED)
     except OSError as error:
-        # Other errors, and those with a file name, should have been translated: report a defect.
+        # Other errors, and errors with a file name, should have been translated: show a traceback.
         if error.errno not in {errno.ENOSPC, errno.EPIPE} or error.filename is not None:
             raise
         # Python flushes stdout again at exit.

@@ -128,7 +128,7 @@ class Hardware:
         return SMBus(bus)
 
     def servo_port(self, settings: Any, open_port: Callable[[Any], Any]) -> Any:
-        """Open the port of a servo bus, a `ServoPort` for `BusSettings`, both of `drivers.servos`.
+        """Open the port of a servo bus: a `ServoPort` of `drivers.servos`, for its `BusSettings`.
 
         `open_port` opens a serial port of this machine.
         """

@@ -19,7 +19,7 @@ WRONG = b"\x5a" * 16
 
 @dataclass
 class Scene:
-    """A robot under attack, and the person in control of it, armed and at rest."""
+    """A robot under attack, armed and at rest, and the person who has control of it."""
 
     robot: RunningRobot
     port: int
