@@ -35,7 +35,7 @@ def place_of(text: str, error: Exception) -> str:
 def read_text(path: Path) -> str:
     """Read a text file of a user, in UTF-8 with or without a byte-order mark.
 
-    The message of a ValueError about another encoding is the end of a sentence.
+    Raises ValueError for other encodings; its message is the end of a sentence.
     """
     data = path.read_bytes()
     try:
@@ -94,7 +94,7 @@ def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
 def write_new(path: Path, content: bytes, mode: int | None = None) -> None:
     """Write a new file completely or not at all; raise OSError if it exists.
 
-    A missing folder is made. `mode` sets its permissions; None for the default of the process.
+    A missing folder is made. `mode` sets the file's permissions; None for the process's default.
     """
     if os.path.lexists(path):
         raise FileExistsError(path)

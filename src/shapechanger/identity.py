@@ -130,9 +130,9 @@ def _sees(space: gym.Space[Any]) -> bool:
 def own_modules(names: Iterable[str]) -> dict[str, str]:
     """Return the hashes of custom modules among `names`, and of custom modules that they import.
 
-    They are the first 16 hex digits of the SHA-256 of each source, keyed by the path below the
-    folder that it is imported from, such as `tasks/jump.py`. Comments are hashed; line ends and the
-    block `if __name__ == "__main__":` are not.
+    The hashes are the first 16 hex digits of the SHA-256 of each source, keyed by its path below
+    the folder that it is imported from, such as `tasks/jump.py`. Comments are hashed; line ends and
+    the block `if __name__ == "__main__":` are not.
     """
     found: dict[str, str] = {}
     waiting, seen = list(names), {""}
@@ -153,7 +153,7 @@ def own_modules(names: Iterable[str]) -> dict[str, str]:
         if file.suffix == ".py":
             source, imported = _read(source, package)
             waiting += imported
-        # Modules that define its attributes, however they were imported.
+        # Add the modules that define this module's attributes, however it imported them.
         values = vars(sys.modules[name]).values() if name in sys.modules else ()
         used = [each for each in [*values] if isinstance(each, ModuleType) or callable(each)]
         waiting += modules_of(*used) - {*_SCRIPTS}

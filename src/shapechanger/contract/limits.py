@@ -14,7 +14,7 @@ from shapechanger.contract.plan import ActionPlan, GuardPlan
 
 _SAME = 1e-6  # Tolerance for values that were rounded to 32-bit floats.
 # gpiozero over lgpio has steps of 1 % (`LGPIOPin._set_state`: `int(value * 100)`). Rounding to them
-# here makes all pin factories equal, and the returned value is the applied one.
+# here makes all pin factories act equally, and the returned value is the applied one.
 _STEPS = 100
 # Speed below which a robot counts as standing, m/s: one count per second of a coarse encoder.
 _STANDS_M_PER_S = 0.01

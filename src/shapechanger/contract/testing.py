@@ -90,7 +90,7 @@ def names_every_number(make: MakeEnv) -> None:
 
 
 def pickles(make: MakeEnv) -> None:
-    """Envs that are made from its pickle and from the JSON of its spec behave like the env."""
+    """Copies of the env, from its pickle and from the JSON of its spec, behave like it."""
     env = make()
     try:
         again = [pickle.loads(pickle.dumps(env))]

@@ -96,7 +96,7 @@ def last_evaluation(study: Path, run: Run) -> Evaluation | None:
 
 
 def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: ReportSteps) -> None:
-    """Perform a run; files of an earlier attempt are deleted, except those of its method."""
+    """Perform a run; delete the curve and the result of an earlier attempt, but no other files."""
     use_one_thread()
     require_planned(plan, run)
     folder = run.folder(Path(study))
@@ -112,7 +112,7 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         if not math.isfinite(evaluation.mean_return):
             raise StudyError(
                 f"{run.name} diverged: its return after {evaluation.steps} steps is "
-                f"{evaluation.mean_return}. Try a smaller learning rate or a milder body."
+                f"{evaluation.mean_return}. Try a smaller learning rate, or change the body less."
             )
         curve.append(evaluation)
         append_line(folder / _CURVE, evaluation)
@@ -215,7 +215,7 @@ def differences(plan: Plan, old: Identities, new: Identities) -> str:
 
 
 def require_planned(plan: Plan, run: Run) -> None:
-    """Refuse a run if its robot, task, method or learner differs from the plan in this process.
+    """Refuse a run if its envs, method or learner differ from the plan in this process.
 
     A file may be edited while a study runs, and another node of a cluster may have another version.
     """
@@ -230,6 +230,6 @@ def require_planned(plan: Plan, run: Run) -> None:
             found[part] = parts[part] if is_robot else identify(ref)
     if text := differences(plan, parts, found):
         raise ForeignStudy(
-            f"An env or code of this study has changed since its plan. {text}. Restore it and run "
-            "the same command again, or start again with another --out."
+            f"An env or code of this study has changed since it was planned. {text}. Restore it "
+            "and run the same command again, or start again with another --out."
         )

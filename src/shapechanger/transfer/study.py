@@ -55,7 +55,7 @@ from shapechanger.transfer.runs import (
 
 STUDY_FILE: Final = "study.json"
 
-# Arms for a target that can adapt its source.
+# Arms that adapt the source to the target, if the target supports them.
 _ADAPTED: Final = ("randomised", "identified")
 # Packages that the numbers depend on.
 _PACKAGES: Final = ("numpy", "scipy", "gymnasium", "mujoco", "torch", "stable-baselines3")

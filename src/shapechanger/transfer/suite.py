@@ -1,8 +1,8 @@
 """Suites: several studies that share the runs of their targets and sources.
 
 Training from scratch on a target does not depend on the source, and a source policy does not depend
-on the target. The seed of a run depends on its kind and index only. So a study copies these runs
-from the finished studies of its suite.
+on the target. The seed of a run depends on its kind and index only. So a study copies these runs,
+if they have ended, from the other studies of its suite.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class StudyOutcome(msgspec.Struct, frozen=True):
 
 
 def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
-    """Make a study's folder in `out`, and copy the runs that it shares with its siblings."""
+    """Make a study's folder in `out`, and copy the runs that it shares with other studies there."""
     make_folder(out)
     folder = out / name
     claim_folder(plan, folder)

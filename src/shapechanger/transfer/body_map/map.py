@@ -53,7 +53,7 @@ def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tu
 
 
 def _invert_entries(half: Half, otherwise: RuleLike) -> tuple[MapEntry, ...]:
-    """Return a rule for each feature of `over` that recovers it from its copies in `into`."""
+    """Return the rule that recovers each feature of `side.over` from a copy in `side.into`."""
     result: list[MapEntry] = []
     for feature in half.side.over:
         name = feature.name

@@ -1,4 +1,4 @@
-"""Resolve the rules of a body map: by exact name, same name, pattern or default; and as TOML.
+"""Find the rule of each feature, by exact name, same name, pattern or default; read maps in TOML.
 
 The TOML form:
 

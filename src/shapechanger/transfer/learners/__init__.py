@@ -81,7 +81,7 @@ class LearnerSettings:
         raise NotImplementedError
 
     def rhythm(self) -> str:
-        """Describe the evaluations and the training data, such as "every 10 steps."."""
+        """Return the end of a sentence about the evaluations, such as "every 10 steps."."""
         return f"every {self.eval_every:,} steps."
 
     def require_budget(self, steps: int, which: str = "") -> None:

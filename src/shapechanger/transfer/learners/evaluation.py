@@ -26,7 +26,7 @@ EVALUATION_SEED: Final = 10_000_000
 """Seed of the first evaluation episode: far from the seeds of training."""
 # Option of an env that selects one of many bodies by its seed.
 _INDIVIDUAL: Final = "finger_seed"
-# Numbers of bodies and of episodes per body with distinct seeds, because seeds must be below 2^32.
+# Largest numbers of bodies, and of episodes per body, that get distinct seeds below 2^32.
 _MOST_INDIVIDUALS: Final = 100_000
 _MOST_EPISODES: Final = 10_000
 

@@ -192,7 +192,7 @@ def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
     # A custom class may ignore `net_arch`.
     if settings.algorithm in {"PPO", "SAC", "TQC"} and weights > known:
         raise ValueError(f"its card needs at least {weights} weights, and it has {known} numbers")
-    # Loading a policy does not create worlds on a device.
+    # Worlds on a device are not limited, because loading a policy does not create them.
     if settings.n_envs > _MOST_ENVS and "device" not in settings.takes:
         raise ValueError(f"its card has {settings.n_envs} envs, more than {_MOST_ENVS}")
 

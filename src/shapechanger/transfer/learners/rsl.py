@@ -159,7 +159,7 @@ class RslLearner(Sb3Learner):
             training.write_back()
 
     def _worlds(self, env: EnvRef) -> tuple[EnvRef, Any]:
-        """Return one reference for all worlds, and the rows of each body or None without limbs."""
+        """Return the env of all worlds, and the rows of each body; None without limbs."""
         return env, None
 
     def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> RslTraining:
@@ -167,7 +167,7 @@ class RslLearner(Sb3Learner):
 
 
 class _Returns:
-    """Discounted returns of worlds; rewards are divided by their deviation, as in `VecNormalize`.
+    """Discounted returns of worlds, by whose deviation rewards are divided, as in `VecNormalize`.
 
     All tensors stay on the device. Sums have the precision and order of `RunningMeanStd`.
     """

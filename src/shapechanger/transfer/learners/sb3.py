@@ -49,8 +49,8 @@ START_LOG_STD: Final = -1.0
 """Smallest logarithm of the standard deviation of an action, in half its range, at the start of
 training from a policy.
 
-A converged policy hardly explores: with the standard deviations of 0.06 to 0.22 of the shipped
-finger's policy, fine-tuning reached no target of another finger in 30,720 steps
+A converged policy hardly explores: the shipped policy of the finger has standard deviations of 0.06
+to 0.22, with which fine-tuning reached no target of another finger in 30,720 steps
 (`python -m benchmarks.run finger-gap`, measured before the minimum was introduced). A larger
 deviation of the source is kept, and none is raised above the deviation of a new policy.
 """
@@ -119,7 +119,7 @@ class Sb3Learner(Learner[Sb3Settings]):
                 on_evaluation(found)
                 return found
 
-            # Without a callback, skip evaluations: a third of the time of training a finger.
+            # Skip evaluations that nothing receives: for a finger, they take a third of the time.
             every = math.inf if on_evaluation is ignore else settings.eval_every
             # Evaluate before `learn`, whose first reset changes the running statistics.
             if on_evaluation is not ignore:
@@ -232,7 +232,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         if not all(torch.isfinite(one).all() for one in weights):
             raise StudyError(
                 f"{self.name} diverged after {model.num_timesteps} steps: its weights are not "
-                "finite. Try a smaller learning rate or a milder body."
+                "finite. Try a smaller learning rate, or change the body less."
             )
 
 

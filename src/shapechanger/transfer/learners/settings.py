@@ -83,7 +83,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
         return msgspec.structs.replace(self, eval_every=every, source_steps=0)
 
     def rhythm(self) -> str:
-        """Return when policies are evaluated, and whether their observations are normalised."""
+        """Return when policies are evaluated, and whether the training data is normalised."""
         seen = (
             "Observations and rewards are normalised for the learner by running estimates of their "
             "standard deviation. Returns in this report never are."
@@ -254,7 +254,7 @@ class ImportedSettings(Sb3Settings, frozen=True, kw_only=True, tag="imported"):
         return self.arguments
 
     def for_one_env(self) -> Self:
-        """Return the settings if there is one env; the steps of an update cannot be changed."""
+        """Return the settings; StudyError unless they already have a single env."""
         if self.n_envs > 1:
             raise StudyError(
                 f"Only one instance of this env can exist: set n_envs=1, not {self.n_envs}."

@@ -30,7 +30,7 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
     """An env whose observations are rows of numbers, and whose actions are one number per limb.
 
     The env needs a property `tree`, its kinematic tree. `room` is the number of limbs with rows,
-    at least the body's number of limbs; 0 for this number.
+    at least as many as the body has; 0 for as many as the body has.
     """
 
     def __init__(self, env: gym.Env[Any, Any], room: int = 0) -> None:
@@ -66,7 +66,7 @@ def limb_spaces(rows: LimbRows) -> tuple[gym.spaces.Box, gym.spaces.Box]:
 def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]:
     """Return `count` envs with rows, which cycle through the bodies and have the same spaces."""
     bodies = each_body(env)
-    # The largest body determines the room, even if no env has it.
+    # The largest body determines the room, even if `count` is too small for an env with it.
     room = rows_of_each(bodies, room)[0].room
     return [LimbEnv(bodies[i % len(bodies)].make(), room) for i in range(count)]
 
@@ -83,8 +83,8 @@ class LimbVecEnv(DummyVecEnv):
     """Many envs with rows, of bodies that may differ in their number of limbs.
 
     Envs whose spaces agree are stepped together. The envs cycle through the bodies of `env`, see
-    `each_body`, at least one of each. `room` is the number of limbs that have rows; 0 for as many
-    as the bodies have.
+    `each_body`, and each body has at least one env. `room` is the number of limbs that
+    have rows; 0 for as many as the bodies have.
     """
 
     def __init__(

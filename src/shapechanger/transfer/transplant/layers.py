@@ -68,8 +68,8 @@ def observation_affine(body_map: BodyMap, source: Scaling, target: Scaling) -> A
 
         z_s = diag(1 / sigma_s) M diag(sigma_t) z_t + (M mean_t + c - mean_s) / sigma_s
 
-    The clipping of z_t replaces the clipping of z_s; they are equal if a number keeps its
-    statistics. Constant numbers are clipped here.
+    The clipping of z_t replaces the clipping of z_s; both have the same effect if a number keeps
+    its statistics. Constant numbers are clipped here.
     """
     matrix = body_map.observation_matrix * target.sigma / source.sigma[:, np.newaxis]
     seen = body_map.observation_matrix @ target.mean + body_map.observation_offset
@@ -197,9 +197,9 @@ def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) 
     """Map squashed target actions to squashed source actions, for SAC's critics.
 
     This is the inverse of the map of outputs. If several target actions copy one source action, the
-    copy of the same name represents it, or else their mean; both are exact for the policy's
-    actions. A target action that copies no source action has the weight 0 until trained, and a
-    source action without a copy is assumed to be 0.
+    copy of the same name represents it, or else the mean of the copies; either is exact for the
+    policy's actions. A target action that copies no source action has the weight 0 until trained,
+    and a source action without a copy is assumed to be 0.
     """
     signs = outputs.mean.matrix
     source_names, target_names = _names(body_map.source_action), _names(body_map.target_action)

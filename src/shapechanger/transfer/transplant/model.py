@@ -147,9 +147,9 @@ def transplant(
     statistics, which is exact up to the clipping of `VecNormalize`.
 
     The map is in the units of the layouts. A model with another action space scales its actions to
-    the ranges of the layout, see `shapechanger.transfer.actions`. PPO's actions are moved before
-    they are clipped to the bounds. Critics keep the units of the rewards that they were trained on,
-    so return statistics are moved too if both envs use `VecNormalize`.
+    the ranges of the layout, see `shapechanger.transfer.actions`. PPO's actions are mapped
+    before they are clipped to the bounds. Critics keep the units of the rewards that they were
+    trained on, so return statistics are moved too if both envs use `VecNormalize`.
 
     Args:
         source_model: A model with the `MlpPolicy` of PPO, SAC or TQC, of any `net_arch`, trained on
