@@ -17,8 +17,8 @@ from tests.drawing import draws, missing
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-# Processes started in the background, such as by `nohup`, ignore SIGINT, and so do their children;
-# some tests interrupt theirs.
+# Processes started in the background, such as by `nohup`, ignore SIGINT, and so do their children,
+# but some tests interrupt the processes that they start.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -32,7 +32,7 @@ settings.load_profile("shapechanger")
 
 
 # The tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml).
-# Tracing slows the others down by a third, and they add nothing to it.
+# Tracing would slow all other tests down by a third, and they add nothing to this coverage.
 COVERING = tuple(
     f"tests/{path}"
     for path in (

@@ -18,10 +18,10 @@ from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.task import fingertip
 
 
-def test_rows_that_only_leaves_out_are_kept(
+def test_a_run_of_some_rows_keeps_the_other_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run of a part replaces its rows, and says by which command the others were measured."""
+    """A run with ONLY replaces these rows, and notes the command that measured the other rows."""
     values = iter("12")
 
     def measured() -> list[Row]:
@@ -53,7 +53,7 @@ def test_every_suite_is_a_function_of_its_module() -> None:
         assert f"def {function}(" in source, name
 
 
-def test_a_wrong_name_in_only_gets_the_nearest(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_name_in_only_has_a_suggestion(monkeypatch: pytest.MonkeyPatch) -> None:
     """The run ends with one sentence before anything is measured."""
     monkeypatch.setattr(sys, "argv", ["run", "vehicles-clone"])
     monkeypatch.setenv("ONLY", "baot")
@@ -63,7 +63,7 @@ def test_a_wrong_name_in_only_gets_the_nearest(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.filterwarnings("ignore:Values in x were outside:RuntimeWarning")  # SciPy 1.15.
 def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
-    """Tensions hold a straight knuckle above a bent finger, and do not bring it there."""
+    """Tensions hold a straight knuckle above a bent finger, but cannot bring it there from rest."""
     hook = fingertip(np.radians([0.0, 0.0, 85.0, 55.0]))
     tensions = {
         share: tuple(share * most for most in NOMINAL.most_tension) for share in (0.4, 0.56)

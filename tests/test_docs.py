@@ -39,8 +39,8 @@ def test_examples_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.sources
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_links_and_blocks(page: Path) -> None:
-    """Links lead to files of the project; blocks inside lists have four spaces, as MkDocs needs."""
-    text = re.sub(r"<!-- .*? -->", "", page.read_text(), flags=re.DOTALL)  # For the site alone.
+    """Links lead to files; blocks inside lists are indented by four spaces, as MkDocs needs."""
+    text = re.sub(r"<!-- .*? -->", "", page.read_text(), flags=re.DOTALL)  # Without comments.
     for target in re.findall(r"\]\((?!http)([^)#]+)\)", text):
         assert (page.parent / target).exists(), target
     fences = re.findall(r"^( +)```", text, re.MULTILINE)

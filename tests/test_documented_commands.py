@@ -32,13 +32,13 @@ FOREIGN: Final = {
     *("--system-site-packages", "--head", "--port", "--block"),
     *("--robot", "--teleop", "--dataset"),
 }
-"""Options of other programs that pages name by themselves."""
+"""Options of other programs that pages name without the program."""
 
 _FENCE: Final = re.compile(r"^( *)```(\w*)\n(.*?)^\1```", re.DOTALL | re.MULTILINE)
 _SPAN: Final = re.compile(r"(?<!`)`([^`\n]+(?:\n[^`\n]+)?)`(?!`)")
-_PYTHON: Final = ("py", "python")  # Those run, in test_docs.py.
+_PYTHON: Final = ("py", "python")  # Python blocks run in test_docs.py.
 _OURS: Final = re.compile(r"(?:^|[\s/;&|])shapechanger (?=[a-z])")
-_NO_COMMANDS: Final = {"shapechanger link 1"}  # A text of the link's proof.
+_NO_COMMANDS: Final = {"shapechanger link 1"}  # Part of the message that proves a key.
 
 
 def _blocks(page: Path) -> list[str]:
@@ -54,7 +54,7 @@ def _blocks(page: Path) -> list[str]:
 
 
 def spans(page: Path) -> list[str]:
-    """Return the inline code of a page, each on one line."""
+    """Return each inline code of a page, on one line."""
     return [" ".join(span.split()) for span in _SPAN.findall(_FENCE.sub("", page.read_text()))]
 
 

@@ -30,7 +30,7 @@ def _write(folder: Path, **files: str) -> None:
 
 
 def test_modules_count_with_all_that_they_import(folder: Path) -> None:
-    """Imports count in functions, of packages with and without `__init__`, and relative ones."""
+    """Imports inside functions, relative ones, and packages without `__init__` count too."""
     _write(
         folder,
         om_task="import numpy\nfrom om_pack import tool\ndef f():\n    import om_late\n",

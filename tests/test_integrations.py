@@ -22,7 +22,7 @@ def _project(folder: Path) -> dict[str, Any]:
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_imported_names_exist(file: Path) -> None:
-    """A name that is renamed here is renamed there too.
+    """Modules and names of Shapechanger that the package imports exist.
 
     Tests of the package import `robot` and not `tests.robot`, because draccus installs a package
     `tests`.

@@ -88,7 +88,7 @@ def test_pins_that_move_something_have_resistors(profile: Profile) -> None:
 
 
 def test_the_one_shot_has_the_time_of_the_profile() -> None:
-    """The resistor equals docs/hardware.md's for 100 ms, and half of it for 50 ms."""
+    """For 100 ms the resistor has the value in docs/hardware.md, and for 50 ms half of it."""
     assert "220 kΩ to 3.3 V" in draw_wiring(load_profile(shipped_profiles()["car"]), "car")
     assert "R = 220 kOhm" in (ROOT / "docs" / "hardware.md").read_text()
     assert "110 kΩ to 3.3 V" in draw_wiring(read_profile(EVERYTHING, Path("rover.toml")), "rover")
@@ -164,7 +164,7 @@ def test_the_site(tmp_path: Path, chromium: Browser) -> None:
                 f'id="{reference_path(package, name)}"' in page or f"<code>{name}</code>" in page
             )
             assert described, f"{package}.{name}"
-        assert "<blockquote>" not in page, f"{package}: an example that no fence holds"
+        assert "<blockquote>" not in page, f"{package}: an example outside a code block"
     odrl = (site / "environments" / "ODRL.html").read_text()
     for env_id in gym.registry:
         if env_id in ODRL_ENVS:
@@ -182,7 +182,7 @@ def test_the_site(tmp_path: Path, chromium: Browser) -> None:
 
 
 def _look(chromium: Browser, address: str, path: str, scheme: Any, width: int) -> None:
-    """Check a page as people see it."""
+    """Check layout, errors, accessibility and requests of a page in a browser."""
     from axe_playwright_python.sync_playwright import Axe
 
     where = f"{path}, {scheme}, {width} pixels"

@@ -25,7 +25,7 @@ def test_reversing_costs_what_driving_forward_earns(speed: float, dt: float) -> 
 
 @given(speed=speeds, dt=seconds)
 def test_the_reward_does_not_depend_on_the_control_rate(speed: float, dt: float) -> None:
-    """The velocity reward per metre is the same for any step duration."""
+    """Two steps of half the duration have the rewards of one whole step."""
     whole = DriveReward().terms(speed, False, True, dt)
     half = DriveReward().terms(speed, False, True, dt / 2)
     for name in whole:

@@ -171,7 +171,7 @@ def test_a_broken_promise_is_found(
 
 
 def test_the_exam_ends_at_the_first_broken_promise() -> None:
-    """The list above contains each promise; the error is an AssertionError."""
+    """`_BROKEN` has an env for each promise; the error is an AssertionError."""
     kept: list[str] = []
     with pytest.raises(BrokenPromise, match="Every start is the same"):
         kept.extend(examine(Still))

@@ -1,4 +1,4 @@
-"""A small robot, a task and a method of a user's own, in a folder that tests edit."""
+"""Two small robots, a task and a method of a user, in a folder that tests edit."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ ONE_UPDATE = msgspec.structs.replace(TINY, n_envs=1, net_arch=(4,), eval_episode
 
 
 def write_project(folder: Path, name: str) -> None:
-    """Write two robots, and modules of a task, its goal and a method, with this prefix."""
+    """Write two robots, and modules `name_...` of a task, its goal and a method."""
     (folder / "a.xml").write_text(XML.format(1.5))
     (folder / "b.xml").write_text(XML.format(2.5))
     (folder / f"{name}_task.py").write_text(TASK.format(name=name))

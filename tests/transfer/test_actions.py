@@ -36,7 +36,7 @@ _HOIST = """
   <geom type="box" size=".1 .1 .1" mass="1.5"/></body></worldbody>
   <actuator>{actuator}</actuator></mujoco>
 """
-# One motor of 32 N in several units; their factors are powers of two, so rounding is equal.
+# A motor of 32 N with controls in several units; factors are powers of two, so rounding is equal.
 _UNITS = {
     "share": '<motor joint="lift" gear="32" ctrlrange="-1 1"/>',
     "newtons": '<motor joint="lift" gear="1" ctrlrange="-32 32"/>',
@@ -72,7 +72,7 @@ def _trained(folder: Path, name: str, unit: str, actuator: str) -> tuple[Any, li
 def test_the_unit_of_an_actuator_does_not_change_learning(
     tmp_path: Path, name: str, units: tuple[str, ...]
 ) -> None:
-    """A robot with other units of its actuator gives equal weights, to the last bit."""
+    """Training gives bitwise equal weights in every unit of the actuator."""
     policy, curve = _trained(tmp_path, name, "share", _UNITS["share"])
     assert len({evaluation.mean_return for evaluation in curve}) > 1
     for unit in units:
@@ -85,7 +85,7 @@ def test_the_unit_of_an_actuator_does_not_change_learning(
 
 @pytest.mark.parametrize("name", ["ppo-balance", "sac"])
 def test_a_policy_acts_in_the_units_of_the_env(tmp_path: Path, name: str) -> None:
-    """The same holds for the loaded policy and for its ONNX export."""
+    """The trained policy, its file and its ONNX export give actions from 0 to 255."""
     policy, _ = _trained(tmp_path, name, "bytes", _BYTES)
     seen = np.random.default_rng(0).normal(size=(20, 2))
     expected = policy.act(seen)
@@ -100,7 +100,7 @@ def test_a_policy_acts_in_the_units_of_the_env(tmp_path: Path, name: str) -> Non
 
 
 def test_a_transplant_keeps_the_units_of_the_map(tmp_path: Path) -> None:
-    """PPO's means and deviations are converted in the units of the layouts."""
+    """PPO's means and deviations are converted from 0 to 255 of the source to ±32 of the target."""
     policy, _ = _trained(tmp_path, "ppo-balance", "bytes", _BYTES)
     source = policy.card.action
     target = Layout((msgspec.structs.replace(source.features[0], low=-32.0, high=32.0),))

@@ -45,7 +45,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 
 def test_demonstrations_pair_images_with_intended_actions() -> None:
-    """Recorded actions are the intended ones for the image before them."""
+    """Each image has the action that the demonstrator intended when it saw the image."""
     shown = record_demonstrations(LANE, 150, 20, 3, _FRAMING)
     assert shown.pictures is not None
     assert shown.pictures.shape == (150, 12, 20, 3)
@@ -85,8 +85,8 @@ def _cloned(
     return policy, found
 
 
-def test_a_clone_improves_with_each_budget(tmp_path: Path) -> None:
-    """There is an evaluation per budget, and the last is better than the first."""
+def test_a_clone_improves_with_its_budget(tmp_path: Path) -> None:
+    """There is an evaluation per budget, and the last one is better than the first."""
     policy, found = _cloned(tmp_path)
     assert [one.steps for one in found] == [0, 30, 60, 120]
     assert found[-1].mean_return > found[0].mean_return + 2.0

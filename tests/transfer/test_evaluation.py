@@ -40,7 +40,7 @@ def test_fingers_are_evaluated_with_different_seeds(pair: set[int], many: int) -
 
 @pytest.mark.parametrize("seed", [0, 99_999, 100_000, 2**32 - 1])
 @pytest.mark.parametrize("kwargs", [{}, {"finger_seed": None}])
-def test_every_seed_of_a_finger_gives_seeds_that_exist(seed: int, kwargs: dict[str, Any]) -> None:
+def test_evaluation_seeds_of_a_finger_are_valid(seed: int, kwargs: dict[str, Any]) -> None:
     """Seeds of episodes stay below 2^32; an env without `finger_seed` has the common seed."""
     env = EnvRef("shapechanger/Finger-v1", kwargs)
     assert evaluation_seed(env, 60) == EVALUATION_SEED
@@ -156,7 +156,7 @@ def test_every_env_of_the_catalogue_has_a_reference() -> None:
 
 @pytest.mark.parametrize("env_id", REFERENCES)
 def test_a_reference_policy_performs_as_stated(env_id: str) -> None:
-    """Its card has the numbers of the reference, and an episode scores far above the floor."""
+    """The card has the reference's numbers; an episode covers 25 % of the way from floor to end."""
     env, reference = EnvRef(env_id), REFERENCES[env_id]
     policy = load_policy(reference_policy(env_id))
     assert policy.card.env == env

@@ -142,7 +142,7 @@ def _alive(pid: int) -> bool:
 
 
 _MEMORY = 80_000_000
-# Reports of the other job, two a second, until the worker of a killed node has ended.
+# Number of progress reports, two a second, after which the worker of a killed node has ended.
 _UNTIL_DEAD = 6
 
 

@@ -243,7 +243,7 @@ class _Actions(BaseCallback):
 
 
 def _source(log_std: float) -> TrainedPolicy:
-    """A policy whose actions have this standard deviation."""
+    """A policy whose actions have this logarithm of their standard deviation."""
     policy = Sb3Learner("tiny", TINY).train(SMALL, 32, 0)
     model: Any = policy.model
     model.policy.log_std.data.fill_(log_std)
@@ -260,7 +260,7 @@ def _source(log_std: float) -> TrainedPolicy:
     ],
 )
 def test_fine_tuning_explores(source: float, of_new: float, start: float, tmp_path: Path) -> None:
-    """A deviation is raised to `START_LOG_STD`, or to a new policy's; the card contains it."""
+    """A smaller deviation is raised to `START_LOG_STD` or, if that is lower, to a new policy's."""
     before, actions = _source(source), _Actions()
     assert before.card.start_log_std is None
     train = Sb3Learner("tiny", msgspec.structs.replace(_LONG, log_std_init=of_new)).train
@@ -299,7 +299,7 @@ def test_training_and_evaluation_alternate(monkeypatch: pytest.MonkeyPatch) -> N
     assert [evaluation.steps for evaluation in curve] == [0, 32, 64, 96]
     assert policy.card.steps == 96
     (calls,) = called.values()
-    # Last episodes of the evaluations; each but the last is followed by training.
+    # Indices of the resets that start the last episode of each evaluation.
     ends = [i for i, call in enumerate(calls) if call == EVALUATION_SEED + TINY.eval_episodes - 1]
     assert len(ends) == 4
     for i in ends:

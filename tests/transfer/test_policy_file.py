@@ -173,7 +173,7 @@ def test_onnx_actions_equal_pytorch(files: tuple[Path, Path]) -> None:
         assert (np.abs(actions) <= 3.0).all()
 
 
-def test_names_are_in_the_file(files: tuple[Path, Path]) -> None:
+def test_an_onnx_file_names_its_features(files: tuple[Path, Path]) -> None:
     facts = {entry.key: entry.value for entry in onnx.load(str(files[1])).metadata_props}
     for side, layout in zip(
         ("observation", "action"), load_policy(files[0]).card.layouts, strict=True

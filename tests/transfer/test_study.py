@@ -127,7 +127,7 @@ _NOT_PLANNED: list[tuple[dict[str, Any], type[Exception], str]] = [
         for name, which in (("steps", "target"), ("source_steps", "source"))
         for steps in (1, 31)
     ),
-    # By default, half of the target steps, rounded up to whole updates.
+    # Source steps are by default half of the target steps, rounded up to whole updates.
     ({"settings": _SPARSE, "steps": 96}, StudyError, "64 source steps "),
     ({"seeds": 1}, StudyError, "at least 2 seeds"),
     # Generators would refuse these seeds, but only after hours of training.

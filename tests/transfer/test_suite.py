@@ -69,7 +69,7 @@ def _names(*kinds: str) -> set[str]:
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a suite with a finished Dry-to-Wet; tests use copies."""
+    """The folder of a suite with the finished study Dry-to-Wet; tests use copies."""
     out = tmp_path_factory.mktemp("suite") / "suite"
     executor = _Recording()
     _run(_plan(DRY, WET), out, executor=executor)
@@ -135,7 +135,7 @@ def test_studies_with_other_plans_share_nothing(out: Path, differs: dict[str, An
     assert _requested(plan, out) == _names(*_KINDS)
 
 
-def test_more_seeds_add_to_those_that_are_done(out: Path) -> None:
+def test_a_study_with_more_seeds_keeps_its_finished_runs(out: Path) -> None:
     assert _requested(_plan(DRY, WET, seeds=3), out) == {
         f"{kind}-2" for kind in _KINDS if kind != "zero-action"
     }
@@ -200,12 +200,12 @@ def test_a_crossing_is_found_along_a_line() -> None:
     [
         (np.full(11, 1200.0), 0.0, True),
         (np.full(11, 400.0), None, False),
-        # Exactly half does not count, up to rounding.
+        # With exactly half, `halves` depends on rounding; it is checked below.
         (np.array([*[0.0] * 5, *[1000.0] * 6]), pytest.approx(5120.0), None),
     ],
     ids=["at once", "never", "half"],
 )
-def test_less_than_half_of_the_steps_of_scratch_is_needed(
+def test_halves_means_less_than_half_of_the_steps_of_scratch(
     fine_tune: NDArray[np.float64], steps: float | None, halves: bool | None
 ) -> None:
     found = _crossing(fine_tune)
@@ -216,7 +216,7 @@ def test_less_than_half_of_the_steps_of_scratch_is_needed(
 
 
 def test_fine_tune_may_be_left_out() -> None:
-    """Then the first other arm that learns there is compared with scratch, or else zero-shot."""
+    """The first arm that learns on the target, or else zero-shot, is then compared with scratch."""
     found = study_outcome("Ant-to-BigAnt", make_study(arms=("scratch", "zero-shot")))
     assert found.arm == "zero-shot"
     assert found.arm_final == found.zero_shot == pytest.approx(400.0)

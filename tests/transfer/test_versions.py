@@ -90,7 +90,7 @@ _EDITS = {
 
 
 @pytest.mark.parametrize(("edit", "seeds"), [*((edit, 2) for edit in _EDITS), ("the task", 3)])
-def test_an_edited_file_does_not_join_older_runs(edit: str, seeds: int, copied: Path) -> None:
+def test_a_study_with_an_edited_file_is_not_resumed(edit: str, seeds: int, copied: Path) -> None:
     """Resuming and adding seeds are refused; the message names the change, and no file changes."""
     file, content, text = _EDITS[edit]
     (copied / file).write_text(content)
@@ -148,8 +148,8 @@ def test_plan_run_and_card_contain_identities(copied: Path) -> None:
     assert set(scratch.identity) == {"target"}
 
 
-def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
-    """A run compares identities at its start and at its end, also on other nodes of a cluster."""
+def test_a_run_whose_env_differs_from_the_plan_is_refused(copied: Path) -> None:
+    """Nothing is written; runs that do not use the changed env are not refused."""
     plan = plan_of("shared")
     (copied / "b.xml").write_text(XML.format(0.5))
     run = Run("scratch", 0)
@@ -208,7 +208,7 @@ from shapechanger.transfer.learners import Learner, LearnerSettings, ignore
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 
 class Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True, tag="constant"):
-    """Settings of a learner that always pushes the same."""
+    """Settings of a learner whose policy always has the same action."""
     push: float = 0.0
     steps: int = 4
     source_steps: int = 2
@@ -292,7 +292,7 @@ def _study(out: Path, arms: tuple[str, ...]) -> Study:
 
 
 def test_a_study_uses_parts_of_other_packages(installed: None, tmp_path: Path) -> None:
-    """The plan is read again, so that the study resumes, and no run is repeated."""
+    """The study is resumed with the plan from its folder, and no run is repeated."""
     arms = ("scratch", "zero-shot", "fine-tune", "patient")
     study = _study(tmp_path / "study", arms)
     assert [e.steps for e in study.of("patient")[0].curve] == [0, 2, 4]

@@ -45,7 +45,7 @@ def test_an_invalid_scale_is_refused(scale: float) -> None:
         ("*/a_*", "*_*", "b.c_d", "b.c/a_d"),
     ],
 )
-def test_stars_take_the_matched_text(template: str, pattern: str, name: str, result: str) -> None:
+def test_stars_become_the_matched_text(template: str, pattern: str, name: str, result: str) -> None:
     assert expand_template(template, pattern, name) == result
 
 
@@ -162,7 +162,7 @@ def test_hold_is_the_middle_of_the_range() -> None:
         ({"foot_*/motor": "copy ankle_*/motor"}, {"foot_3/motor": Copy("ankle_3/motor")}),
     ],
 )
-def test_exact_names_come_before_partners_and_these_before_globs(
+def test_exact_names_precede_partners_and_partners_precede_globs(
     rules: dict[str, RuleLike], expected: dict[str, Rule]
 ) -> None:
     assert rules_of(grown(rules=rules)).items() >= expected.items()

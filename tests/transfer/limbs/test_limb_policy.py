@@ -34,7 +34,7 @@ from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 
 ANT, EXTENDED = EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1")
-# Two of these have a foot, each on another leg, and two are of one layout.
+# Eleven of these twelve bodies have eight limbs and one layout; the other one also has a foot.
 SOME: dict[str, Any] = {"bodies": {"split": "train", "count": 12}}
 
 
@@ -160,7 +160,7 @@ class _Strange(gym.Wrapper[Any, Any, Any, Any]):
 
 
 def test_strange_layouts_are_refused() -> None:
-    """A number that belongs to no part of the body has no row."""
+    """Numbers of a task are in the trunk's row; all others must belong to a part of the body."""
     goal = Feature("goal/x", "m", element=Element("task", "goal"))
     wing = Feature("wing/angle", "rad", element=Element("body", "wing"))
     motor = Feature("flap/motor", "1", -1.0, 1.0, Element("actuator", "flap"))
@@ -253,7 +253,7 @@ def test_limbs_without_a_motor_have_no_effect_on_probabilities(policy: TrainedPo
 
 
 def test_statistics_of_a_policy(policy: TrainedPolicy) -> None:
-    """Rows are already scaled; fine-tuning continues the statistics of the critic's returns."""
+    """Rows are not normalised; fine-tuning continues the source's statistics of returns."""
     assert policy.normalisation is not None
     assert not policy.normalisation.observation.mean.any()
     assert (policy.normalisation.observation.var == 1.0).all()

@@ -44,7 +44,7 @@ def worlds(**arguments: Any) -> Any:
 
 
 def test_a_short_training_raises_the_return(tmp_path: Path) -> None:
-    """The loaded policy acts as the trained one."""
+    """The return more than doubles, and the loaded policy acts as the trained one."""
     found: list[Evaluation] = []
     counted: list[int] = []
     learner = learner_of("rsl-ppo", SETTINGS)
@@ -145,7 +145,7 @@ def _net(policy: TrainedPolicy) -> LimbPolicy:
 
 
 def test_networks_of_rsl_rl_equal_the_policy(policy: TrainedPolicy) -> None:
-    """In bodies of 12 and of 8 limbs they act as the policy does on the CPU."""
+    """In bodies of 12 and of 8 limbs, rsl-rl's networks act as the policy does on the CPU."""
     worlds = _worlds(["ExtendedAnt", "Ant", "ExtendedAnt"])
     net = _net(policy)
     actor = LimbModel(net, net.actor_net, acts=True)
@@ -186,7 +186,7 @@ def test_probabilities_equal_the_policys(policy: TrainedPolicy) -> None:
     assert entropy[0].item() == pytest.approx(1.5 * entropy[1].item())
 
 
-def test_worlds_of_equal_spaces_and_several_batches() -> None:
+def test_batches_of_worlds_with_equal_spaces_share_a_tensor() -> None:
     """Rows and actions of all batches are in one tensor, as in the vector env."""
     bodies = ["Swimmer", to_json([JointRange("free_body_rot", -2.0, 2.0)])]
     swimmer = EnvRef("shapechanger/Swimmer-v1")

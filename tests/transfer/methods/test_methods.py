@@ -43,7 +43,7 @@ from tests.transfer.test_learners import SHORT
 
 @pytest.fixture
 def no_other(monkeypatch: pytest.MonkeyPatch) -> dict[str, type[Method]]:
-    """An empty registry."""
+    """The registered methods; empty at first."""
     found: dict[str, type[Method]] = {}
     monkeypatch.setattr(METHODS, "_registered", found)
     return found
@@ -126,7 +126,7 @@ def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
     assert set(made.summaries) == set(_LEARNING)
 
 
-def test_methods_start_with_the_source_policy(study: tuple[Study, Path]) -> None:
+def test_methods_that_fine_tune_start_with_the_source_policy(study: tuple[Study, Path]) -> None:
     made, _ = study
     starts = {kind: made.of(kind)[0].curve[0].mean_return for kind in _LEARNING}
     assert starts["frozen-trunk"] == starts["evolution"] == starts["fine-tune"]

@@ -152,7 +152,7 @@ def test_a_shipped_reference_overrides_the_best_arm() -> None:
 
 
 def test_the_floor_is_scored_too() -> None:
-    """Scores of curves in total steps equal curves of scores in total steps."""
+    """Scoring and counting source steps can be done in either order."""
     reference = Reference(zero=-100.0, one=300.0)
     first_counted = reference.scores(in_total_steps(SCRATCH, 7, reference.zero))
     first_scored = in_total_steps(reference.scores(SCRATCH), 7, 0.0)

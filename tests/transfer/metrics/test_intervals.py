@@ -54,13 +54,13 @@ def test_welch_takes_one_arm_without_spread() -> None:
 def test_studentised_bootstrap_by_the_book(scratch: NDArray[np.float64]) -> None:
     """Efron & Tibshirani's algorithm, one resample after the other.
 
-    Of three seeds in each arm one resample in 81 has no error: far out in both tails.
+    With three seeds in each arm, one resample in 81 has no error and counts as infinite.
     """
     arm = ARM if scratch.size > 3 else ARM[:3]
     value = arm.mean() / scratch.mean()
 
     def error(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-        """Delta method, as relative errors that add up."""
+        """Delta method: the squares of the relative errors add up."""
         relative = [s.std(ddof=1) / np.sqrt(s.size) / s.mean() for s in (a, b)]
         return float(np.hypot(*relative) * a.mean() / b.mean())
 
@@ -126,7 +126,7 @@ def test_ratio_over_too_little_is_undefined() -> None:
         (ARM[:2], SCRATCH[:2]),
         # Scratch has no spread, and up to rounding the arm has none in one resample of nine.
         (np.array([0.1, 0.2, 0.7]), np.full(5, 0.5)),
-        # Three of five seeds are zero: in one resample of thirteen all are, without spread.
+        # Three of five seeds are zero: one resample in thirteen has only zeros, without spread.
         (np.array([0.0, 0.0, 0.0, 0.1, 0.2]), SCRATCH),
         # All seeds are zero: the ratio is exactly zero, without spread.
         (np.zeros(5), SCRATCH),
@@ -162,7 +162,7 @@ def test_the_middle_half_is_averaged() -> None:
 
 
 def test_improvement_matches_mann_whitney() -> None:
-    """It is U divided by the number of pairs, averaged over studies; equal runs count half."""
+    """The value is U per pair of runs, averaged over studies; equal runs count half."""
     rng = np.random.default_rng(1)
     arm, scratch = rng.normal(0.5, 1.0, 7), rng.normal(0.0, 1.0, 5)
     one = probability_of_improvement([arm], [scratch], rng=_rng())

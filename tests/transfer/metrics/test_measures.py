@@ -73,7 +73,7 @@ def test_the_last_evaluations_must_exist(last_k: int) -> None:
 @pytest.mark.parametrize(
     ("source_steps", "gain"),
     [
-        # The arm at 20 and 40 equals its values at 15 and 35: 0.7 and 0.95.
+        # At total steps 20 and 40 the arm has its values of target steps 15 and 35: 0.7 and 0.95.
         (5, (0.7 + 0.95) / 2 - 0.6),
         # At 20 steps the arm has the floor, and at 40 its value of target step 10.
         (30, (0.0 + 0.6) / 2 - 0.6),
@@ -148,7 +148,7 @@ def test_every_measure_refuses_other_evaluations(
         measure(shorter, SCRATCH)
 
 
-# The seeds reach 0.5 at step 5, at 30, never, and at 0, where the curve falls again.
+# The seeds reach 0.5 at step 5, at step 30, never, and at step 0, after which the curve falls.
 LATE = LearningCurves(
     STEPS, np.array([[0, 1.0, 1.0, 1.0], [0, 0, 0, 1.0], [0, 0.2, 0.4, 0.3], [0.5, 0.0, 0.0, 0.9]])
 )
@@ -162,7 +162,7 @@ def test_first_crossing_of_the_line() -> None:
     np.testing.assert_allclose(steps_to_reach(SLOW, 0.5), [40.0, math.inf])
 
 
-def test_a_floor_above_the_threshold_is_there_at_once() -> None:
+def test_a_floor_above_the_threshold_reaches_it_at_once() -> None:
     assert not steps_to_reach(in_total_steps(LATE, 10, 0.6), 0.5).any()
     np.testing.assert_allclose(steps_to_reach(LATE, -1.0), np.zeros(4))
 
@@ -219,7 +219,7 @@ def test_forward_transfer() -> None:
     assert transfer(BETTER, WORSE).value == pytest.approx(0.375)
 
 
-def test_interval() -> None:
+def test_forward_transfer_has_an_interval() -> None:
     """With enough seeds there is a bootstrap interval, whose ends are at most 1."""
     heights = np.linspace(0.0, 0.3, 5)
     arm = curves(*((h, 0.3 + h, 0.6 + h) for h in heights))
@@ -310,7 +310,7 @@ def test_summary_states_its_settings() -> None:
     assert result == summary()
 
 
-def test_arms_that_did_not_learn_leave_values() -> None:
+def test_without_scores_only_gains_are_defined() -> None:
     """Without scores, gains are in units of the measure and the rest is undefined."""
     result = summary(reference=Reference(zero=400.0, one=300.0))
     assert result.unit == "value"

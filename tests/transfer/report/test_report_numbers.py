@@ -24,7 +24,7 @@ from shapechanger.transfer.report.verdict import estimate_text
     ],
 )
 def test_numbers_are_short(value: float, text: str) -> None:
-    """Four digits, thousands separators, and exponents for huge numbers."""
+    """Decimals end at four significant digits, or six decimals; huge numbers have exponents."""
     assert number(value) == text
 
 
@@ -50,7 +50,7 @@ def test_the_sign_is_that_of_the_rounded_number() -> None:
 def test_intervals_have_two_significant_digits(
     low: float, value: float, high: float, text: str
 ) -> None:
-    """Digits depend on the width; an end other than zero has up to six decimals to show it."""
+    """Decimals depend on the width; up to six keep an end other than zero from looking like 0."""
     assert interval_text(value, low, high) == text
 
 

@@ -304,8 +304,8 @@ def test_names_of_a_suite_are_escaped() -> None:
         suite_html("none", {}, seeds=5)
 
 
-def test_without_learning_there_are_no_scores() -> None:
-    """The table is empty, and the verdict counts the study as showing nothing."""
+def test_a_study_without_learning_shows_nothing() -> None:
+    """The verdict counts the study as one that shows nothing."""
     flat = rising(0.0, 0.0, 1e3, noise=0.0)
     none = {"zero_shot": flat[:, :1], "random": np.zeros((5, 1))}
     studies = {"a": make_study(scratch=flat, fine_tune=flat, **none)}

@@ -331,8 +331,8 @@ def test_sac_cannot_scale_or_shift_its_actions(low: float, high: float) -> None:
         transplant(trained(SAC, body_map), body_map, targets(body_map))
 
 
-def test_sac_follows_the_range() -> None:
-    """A scale equal to the ranges' keeps SAC's weights."""
+def test_sac_accepts_a_scale_equal_to_the_ratio_of_the_ranges() -> None:
+    """A motor with half the range gets half of the source's action."""
     narrow = Layout((Feature("slide/motor", "1", -0.5, 0.5, gain=200.0, gain_unit="N"),))
     body_map = carts(pendulum_action(), narrow, units="torque")
     source = trained(SAC, body_map)
@@ -360,7 +360,7 @@ def test_critics_use_the_equal_name_or_the_mean() -> None:
 
 
 def test_statistics_go_with_their_names() -> None:
-    """Copied numbers keep mean and variance, scaled; new ones get a guess."""
+    """Copied numbers get the source's mean and variance, scaled; new numbers get a guess."""
     body_map = BodyMap.between(
         Layout((Feature("copy", "m"), Feature("z", "m"), Feature("angle", "rad"))),
         Layout(
@@ -423,7 +423,7 @@ def test_statistics_can_be_folded_into_the_weights(
     theirs = source.get_vec_normalize_env()
     theirs.clip_obs, theirs.epsilon = np.inf, epsilon
     source.policy.double()
-    statistics = theirs.obs_rms if given else None  # Alone, they have SB3's default epsilon.
+    statistics = theirs.obs_rms if given else None  # Without an epsilon: SB3's default is used.
     target = transplant(source, body_map, targets(body_map), normalisation=statistics)
     check_same_function(source, target, body_map, 1e-12)
 
@@ -441,7 +441,7 @@ def test_statistics_can_be_named_for_a_model_without_an_env(tmp_path: Any) -> No
 
 
 def test_only_the_target_normalises() -> None:
-    """Changing statistics of the target alone are refused; frozen ones are used."""
+    """Statistics of the target alone are refused while they change, and used if they are frozen."""
     body_map = MAPS["growth"]
     source = trained(PPO, body_map)
     env = targets(body_map, normalised=True)
@@ -631,7 +631,7 @@ def test_gaussian_outputs_by_hand() -> None:
     body_map = carts(source, target, rules=rules)
     own = gym.spaces.Box(-1.0, 1.0, (2,))
     outputs = gaussian_outputs(body_map, own, own)
-    # The env's action 3 (2 + 2 x) of the model's x is 6 + 8 y of the target's.
+    # The source's output x is the action 2 + 2 x, and 3 (2 + 2 x) is the target's action 6 + 8 y.
     np.testing.assert_allclose(outputs.mean.matrix, [[0.75, 0.0], [0.0, 0.0]])
     np.testing.assert_allclose(outputs.mean.offset, [0.0, 0.5])
     np.testing.assert_allclose(outputs.log_std.offset, [np.log(0.75), 0.0])
@@ -653,7 +653,7 @@ def test_only_constant_numbers_are_clipped_before_the_network() -> None:
 
 
 def test_squashed_outputs_by_hand() -> None:
-    """Ranges off 0, in the units of the env: copies, and constants inside and at the end."""
+    """Models act in ranges of the env that are not centred at 0: copies and constants."""
     ours = (("a", 0.0, 2.0), ("b", 2.0, 6.0), ("high", 1.0, 3.0), ("low", -3.0, -1.0))
     theirs = (("a", 0.0, 2.0), ("held", 0.0, 8.0), ("b", 2.0, 6.0), ("end", 0.0, 8.0))
     source, target = (
