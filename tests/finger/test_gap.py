@@ -48,7 +48,7 @@ def test_parameters_are_drawn_from_their_ranges(name: str) -> None:
 
 
 def test_draws_span_all_torques(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If hardly any draw does, the error names the range to reduce."""
+    """Drawn arms give every torque; if hardly any arms do, the error names the range to reduce."""
     gap, rng = msgspec.structs.replace(_REAL_LIKE, arm_error=0.6), np.random.default_rng(0)
     assert all(spans_all_torques(gap.draw(rng).arms) for _ in range(40))
     raw = NOMINAL.arms * (1.0 + rng.uniform(-0.6, 0.6, (200, 7, 4)))

@@ -107,7 +107,7 @@ def test_joints_stiffen_towards_the_ends_of_their_ranges() -> None:
 
 
 def test_the_hood_couples_the_end_joint() -> None:
-    """After 2 s of a constant command, the angle is within 16 degrees of the coupled angle."""
+    """After 2 s of a constant command, the end joint is within 16 degrees of its coupled angle."""
     model, rng = made(NOMINAL, "impedance"), np.random.default_rng(0)
     off = []
     for _ in range(60):

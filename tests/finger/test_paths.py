@@ -111,7 +111,7 @@ def test_times_are_batched(path: FingertipPath, times: Sequence[Sequence[float]]
 def test_a_shape_round_trips_through_csv(
     path: Any, digits: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """A shape that is written with six digits and read again is within 0.01 mm."""
+    """A shape that is written with 6 or 12 decimals and read again is within 0.01 mm."""
     times = np.linspace(0.0, path.duration_s, 1 + math.ceil(100.0 * path.duration_s))
     points = path.at(times)
     assert np.linalg.norm(path.position(times, 1), axis=1).max() <= FASTEST_MPS + 1e-9
@@ -148,7 +148,7 @@ def test_paths_are_immutable(path: FingertipPath) -> None:
     [((0, 1, 0), 1), ((0, 0, -3), 3), ((1, 0, 0), 1), ((2, 3, 6), 7), ((1e-200, 0, 0), 1e-200)],
 )
 def test_a_circle_is_round(normal: Point, length: float) -> None:
-    """Points are in the plane, at the radius, and turn counter-clockwise at constant speed."""
+    """Points are in the plane, at the radius, and turn around the normal at constant speed."""
     path: Any = circle(0.01, hz=2.0, normal=normal)
     t = np.linspace(0.0, 0.5, 100)
     arms, velocity = path.at(t) - CENTRE, path.position(t, 1)
@@ -164,7 +164,7 @@ def test_a_circle_is_round(normal: Point, length: float) -> None:
 def test_a_figure_eight_crosses_itself_once() -> None:
     """The path passes its centre twice a period, and the loops turn in opposite directions.
 
-    A curve is the figure eight, bent along the normal.
+    A depth bends the path along the normal, and changes nothing else.
     """
     path: Any = figure_eight(0.02)
     t = np.linspace(0.0, 2.0, 2001)
@@ -226,7 +226,7 @@ def test_a_function_determines_the_positions() -> None:
 
 @pytest.mark.parametrize("given", [(0.0, 0.0), "abc", (0.0, 0.0, "z"), None, (0, 0, math.nan)])
 def test_a_point_is_three_finite_numbers(given: object) -> None:
-    """The error shows another result, at any time of the path."""
+    """Any other result is refused at any time of the path, and the error shows it."""
     function: Any = lambda t: given if t > 60.0 else (0.0, 0.0, 0.0)  # noqa: E731
     path = from_callable(function)
     for fails in (lambda: path.at([59.0, 61.0]), lambda: from_callable(lambda _: given)):
@@ -334,7 +334,7 @@ def test_files_without_the_columns_are_refused(write: Callable[[str], File]) -> 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_mapping_has_settings_of_a_shape(kind: str) -> None:
+def test_a_shape_can_be_given_with_settings(kind: str) -> None:
     given = {"kind": kind, "hz": 0.5}
     assert as_path(kind) == as_path(given) == as_path(as_path(kind)) != as_path(given | {"hz": 0.4})
     assert "kind" in given  # The mapping is not modified.

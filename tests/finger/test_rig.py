@@ -63,7 +63,7 @@ def test_angles_follow_from_lengths_and_stretch() -> None:
 
 
 def test_commands_are_shares_in_the_order_of_the_rig(tmp_path: Path) -> None:
-    """The pretension and lower tensions are 0; the largest and higher tensions are 1."""
+    """Tensions up to the pretension give the command 0; tensions from the largest on give 1."""
     text = find_profile("finger").read_text()
     begin, end = text.index("[action.FDP]"), text.index("[action.FDS]")
     moved = text[:begin] + text[end:] + "\n" + text[begin:end]
@@ -85,7 +85,7 @@ def test_other_robots_are_refused(name: str) -> None:
 
 
 def test_encoders_give_the_fingertip_for_any_arms() -> None:
-    """With arms off by 20 %, encoders are exact and lengths are not."""
+    """With arms off by up to 20 %, angles are exact from encoders, and not from lengths."""
     rng = np.random.default_rng(1)
     arms = MOMENT_ARMS * (1.0 + rng.uniform(-0.2, 0.2, MOMENT_ARMS.shape))
     angles = np.array([0.9, -0.1, 1.1, 0.6])
@@ -98,7 +98,7 @@ def test_encoders_give_the_fingertip_for_any_arms() -> None:
 
 
 def test_velocities_are_smoothed_differences_of_the_encoders() -> None:
-    """Velocities equal the simulation's with joint noise, and start at zero."""
+    """Velocities are estimated as in a simulation with joint noise, and start at zero."""
     senses, differences = _encoders(), JointVelocities()
     fastest = 0.0
     for i in range(5):

@@ -77,7 +77,7 @@ def test_tensions_are_within_bounds(seed: int) -> None:
 
 @pytest.mark.parametrize("mode", DRIVES)
 def test_command_inverts_tension(mode: str) -> None:
-    """At the resting length, -1 and 1 give the least and the largest tension."""
+    """At the resting length, -1 and 1 give the least and largest tension, except for "length"."""
     rng = np.random.default_rng(0)
     drive = drive_of(mode, NOMINAL)
     command, length, speed = rng.uniform(-1, 1, (3, 7)) * [[1.0], [0.01], [0.2]]
@@ -127,7 +127,7 @@ _FDS, _DI = 1, 5
 
 def test_moment_arms_follow_from_measured_forces() -> None:
     aside, along, across, torque = map(np.array, (_ASIDE, _ALONG, _ACROSS, _TORQUE))
-    # FDS and DI exert no torque on the last joint, which determines its position from the tip.
+    # FDS and DI exert no torque on the last joint, so their forces determine where it is.
     y = torque[_DI] / across[_DI]
     z = (torque[_FDS] - y * across[_FDS]) / -along[_FDS]
     assert math.hypot(y, z) == pytest.approx(0.016, abs=1e-4)

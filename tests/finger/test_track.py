@@ -25,7 +25,7 @@ def test_default_shapes_can_be_followed(kind: str) -> None:
 
 
 def test_observations_look_ahead() -> None:
-    """Observations have the path after 0.02, 0.06, 0.12 and 0.20 s, relative to the fingertip."""
+    """Observations have points 0.02, 0.06, 0.12 and 0.20 s ahead, relative to the fingertip."""
     env = FingerTrackEnv()
     seen, info = env.reset(seed=0)
     begins = info["target"]

@@ -69,13 +69,13 @@ JOINT_FRICTION: Final[NDArray[np.float64]] = np.array([1.0, 1.0, 0.7, 0.4]) * 1e
 """Coulomb friction of the joints, N·m. The values are chosen. Esteki & Mansour 1996 (J.
 Biomechanics 29:443) found losses that hardly grow with speed."""
 
-# Moment arms, mm. The laboratory of Valero-Cuevas publishes the force and torque at the fingertip
-# of each tendon of a cadaver's index finger (R/main.r of github.com/bc/stfeasibility), in an
-# unspecified posture. FDS and DI have no moment arm at the end joint, so their forces and torques
-# determine the fingertip's distance from it, 16 mm, and its flexion, 10 degrees. For the arms
-# below, the knuckle and the middle joint are assumed to be flexed by 45 degrees, as in other work
-# of the laboratory. A different posture causes small errors. The often quoted arms of An et al.
-# 1983 (J. Biomechanics 16:419) differ by up to 4 mm; see `AN_1983_ARMS`.
+# Moment arms, mm. The laboratory of Valero-Cuevas publishes the force and torque that each tendon
+# of a cadaver's index finger exerts at the fingertip (R/main.r of github.com/bc/stfeasibility), in
+# an unspecified posture. FDS and DI have no moment arm at the end joint, so their forces and
+# torques determine the fingertip's distance from it, 16 mm, and its flexion, 10 degrees. For the
+# arms below, the knuckle and the middle joint are assumed to be flexed by 45 degrees, as in other
+# work of the laboratory. A different posture causes small errors. The often quoted arms of An et
+# al. 1983 (J. Biomechanics 16:419) differ by up to 4 mm; see `AN_1983_ARMS`.
 _MOMENT_ARMS_MM: Final = {
     "FDP": (8.6, -2.7, 4.9, 3.6),
     "FDS": (9.0, -1.3, 4.0, 0.0),
@@ -90,7 +90,7 @@ MOMENT_ARMS: Final[NDArray[np.float64]] = np.array([_MOMENT_ARMS_MM[t] for t in 
 joint."""
 
 # An, Ueba, Chao, Cooney & Linscheid 1983, "Tendon excursion and moment arm of index finger
-# muscles", J. Biomechanics 16:419. The numbers are quoted from memory: check them in the paper.
+# muscles", J. Biomechanics 16:419. The numbers are from memory, not checked in the paper.
 _AN_1983_MM: Final = {
     "FDP": (11.1, 1.1, 7.9, 4.1),
     "FDS": (11.9, 1.7, 6.2, 0.0),

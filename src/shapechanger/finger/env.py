@@ -148,7 +148,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self.plant.place(JOINT_REST, np.random.default_rng(0))  # Until the first reset.
 
     def _place(self, options: dict[str, Any] | None) -> FingerSenses:
-        """Draw the finger if each episode has another one, and put the finger at a start."""
+        """Draw a finger if each reset draws one, and put the finger at its start."""
         require_known("option of reset", self._options, *(options or {}))
         if self._is_drawn_anew and self._gap is not None:
             self._use(self._gap.draw(self.np_random))
@@ -312,8 +312,8 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
 
         The finger moves for ten seconds, determined by `seed`. A log hardly reveals parameters of
-        the motors. For a finger with a command path, they are drawn for each episode as in the gap
-        "wide".
+        the motors. For a finger with a command path, these parameters are drawn for each
+        episode as in the gap "wide".
         """
         # Imported here, because an env that only steps does not need the optimiser.
         from shapechanger.finger.identify import identify, record_babble

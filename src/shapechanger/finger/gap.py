@@ -194,7 +194,7 @@ def shipped_rig() -> FingerParameters:
 def geared_around(found: FingerParameters) -> Gap:
     """Return the gap of a finger on geared servos after identification.
 
-    Path, arms, joints, stretch and delay are identified, and drawn within their errors. A log
+    Arms, joints, stretch and delay are drawn within the errors of the identification. A log
     hardly reveals parameters of the motors, so they keep their ranges in "wide".
     """
     late = found.command_delay + _DELAY_FOUND_S

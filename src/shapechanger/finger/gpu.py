@@ -51,7 +51,7 @@ class DeviceFinger(Worlds):
         self._gives, self._held = parameters.gives, plant.held
         self._noisy = parameters.joint_noise > 0.0, parameters.tension_noise > 0.0
         super().__init__(env, model, *args, **kwargs)
-        # Indices of each actuator's former controls, which follow two settings and the times.
+        # Indices of the former controls in MuJoCo's history, after two settings and the times.
         samples = int(model.actuator_history[0, 0])
         first = np.asarray(model.actuator_historyadr) + 2 + samples
         self._former = torch.as_tensor(
@@ -245,7 +245,7 @@ class DeviceTrack(DeviceFinger):
     """Fingers that follow a path.
 
     Points of the path and start angles are computed on the CPU, because paths are NumPy functions.
-    A step therefore copies a mask of the started fingers from the device, and points to it.
+    Each step therefore copies the mask of started fingers to the CPU, and path points back.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -284,7 +284,7 @@ class DeviceTrack(DeviceFinger):
 
     @property
     def _rms(self) -> Tensor:
-        """Root mean square of the distances counted so far, m, shape (n,); infinite without any."""
+        """Root mean square of the counted distances, m, shape (n,); infinite before the first."""
         counted = (self._steps - SETTLING_STEPS).clip(0)
         return torch.where(counted > 0, (self._squares / counted).sqrt(), torch.inf)
 

@@ -50,7 +50,7 @@ def converted(failure: str, value: Any, kind: type[_T]) -> _T:
 
 
 class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Path from the commands of a rig to tensions, with the names and units of its profile.
+    """Path from the commands of a rig to tensions, with the names and units of the rig's profile.
 
     Without a path, each simulation step computes tensions from commands, lengths and speeds. Lag
     and delay are fields of `FingerParameters`, with or without a path.
@@ -62,7 +62,7 @@ class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             `control_hz`.
         slew_per_s: Fastest rise of a tension, in ranges from the least to the most tension per
             second; None for no limit.
-        slew_down_per_s: Fastest fall of a tension, share of its range per second; None for no
+        slew_down_per_s: Fastest fall of a tension, in such ranges per second; None for no
             limit.
         tension_step: Resolution of the tensions, N, which are rounded down; 0 for none.
 

@@ -226,7 +226,7 @@ def _vector(name: str, value: Any) -> Array:
 
 
 def _axes(normal: Vector) -> list[Array]:
-    """Return unit vectors along a plane, close to x, across it and out of it: right-handed."""
+    """Return right-handed unit vectors: two in a plane, the first near x, and its normal."""
     out = _vector("The normal of a plane", normal).copy()
     if not out.any():
         raise PathError("The normal of a plane must not be (0, 0, 0): it has no direction.")

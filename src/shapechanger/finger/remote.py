@@ -128,7 +128,7 @@ class RigMixin(FingerEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Start an episode; the options equal the simulated task's.
+        """Start an episode; the options are the same as in the simulation.
 
         Raises:
             UnknownName: If the name of an option is unknown.
@@ -254,7 +254,7 @@ class RigMixin(FingerEnv):
         return senses
 
     def _with_rig(self, info: dict[str, Any]) -> dict[str, Any]:
-        """Return an info of the task with the rig's, and with the true state of a twin."""
+        """Return an info of the task with the rig's entries and the true state of a twin."""
         of_rig = {n: v for n, v in self._rig_info.items() if not n.startswith(_DRIVING)}
         info = {"truncated_because": "", **of_rig, **info}
         if self._truth:
@@ -286,7 +286,7 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     The operator arms a rig; the env arms a twin. For up to 1 s, the env moves the finger to the
     start of `Finger-v1` for the same seed. The measured error is a few hundredths of a radian, or
     more if gears stick. The target is the same. Servos of the env's own twin are cool at the start;
-    servos of a rig need pauses, or switch off.
+    servos of a rig need pauses, or they get hot and switch off.
 
     ## End
     Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost

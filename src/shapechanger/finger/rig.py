@@ -1,4 +1,4 @@
-"""Conversion of a rig's measurements to those of `Finger-v1`, and of tensions to its commands."""
+"""Converts a rig's measurements to those of `Finger-v1`, and tensions to the rig's commands."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class RigSenses:
     def misfit(self, senses: FingerSenses) -> str:
         """Return why the lengths fit no posture, with the worst tendon, or "" if they fit one.
 
-        Lengths fit no posture if tendons are slack, or if a servo lost power and so its turns.
+        Lengths fit no posture if tendons are slack, or if a servo lost power, and so lost turns.
         """
         longer = senses.lengths + _COMPLIANCE * senses.tensions + MOMENT_ARMS @ senses.angles
         worst = int(np.argmax(np.abs(longer)))

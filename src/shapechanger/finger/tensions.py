@@ -71,7 +71,7 @@ class TendonDrive:
         The command may be outside of -1 to 1.
         """
         pulled = self.stiffness * length + self.damping * speed
-        # A very short muscle has no strength, so a least one is assumed.
+        # A very short muscle has no strength, so a minimum is assumed.
         strength = self._strength(length, speed).clip(_WEAKEST)
         return ((tension - pulled) / strength - self.offset) / self.gain
 

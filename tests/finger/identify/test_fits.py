@@ -49,7 +49,7 @@ def exact() -> Kinematics:
 
 
 def motors(**changes: float) -> Motors:
-    """Return motors that match the log, with changes."""
+    """Return motors that match the log of `short`, with changes."""
     found = Motors(0.020, 0.022, 1.0, (1e-4, 1e-4, 0.0), saturates=False, tension_noise=0.0)
     return dataclasses.replace(found, **changes)  # pyright: ignore[reportArgumentType]
 
@@ -112,7 +112,7 @@ def stepped() -> CommandSignal:
 
 
 def test_a_command_acts_in_the_period_that_ends_with_its_row() -> None:
-    """The step acts from 0.98 s plus the delay on; in a partial step, the mean is returned."""
+    """The command steps at 0.98 s plus the delay; a time step across the change has the mean."""
     late = stepped().delayed(0.96, 0.01, 6, 0.0)
     np.testing.assert_allclose(late[:, 0], [0, 0, 1, 1, 1, 1], atol=1e-9)
     late = stepped().delayed(0.96, 0.01, 6, 0.025)
@@ -185,7 +185,7 @@ def test_slack_and_the_start_of_a_log_are_outliers() -> None:
 
 
 def test_the_covariance_has_newey_west_weights() -> None:
-    """Lag k of L steps has the weight 1 - k / (L + 1), with L half a second."""
+    """With L lags in half a second, lag k has the weight 1 - k / (L + 1)."""
     residual = np.array([[1.0], [2.0], [-1.0], [3.0]])
     # Two lags of 0.25 s: 1 + 4 + 1 + 9, + 2 (2/3) (2 - 2 - 3), + 2 (1/3) (-1 + 6); over 4 squared.
     expected = (15.0 - 2.0 * (2.0 / 3.0) * 3.0 + 2.0 * (1.0 / 3.0) * 5.0) / 16.0

@@ -139,7 +139,7 @@ def test_stiffness_has_the_interval_of_its_inverse() -> None:
     assert (unclear.value, unclear.high) == (math.inf, math.inf)
     assert not unclear.differs
     assert estimates(-1e-4, 1e-6)["tendon_stiffness"].low == math.inf
-    # Finite above 1.96 standard errors and the least relevant stretch, 250 kN/m.
+    # The stiffness is finite if the compliance is above 1.96 standard errors and 1 / (250 kN/m).
     for compliance, sd, stiffness in (
         (1e-4, 0.5e-4, 1e4),
         (1e-4, 0.52e-4, None),

@@ -57,7 +57,7 @@ def test_invalid_logs_are_rejected(changes: dict[str, Any], sentence: str) -> No
 
 
 def coupled(own_deg: float) -> FingerLog:
-    """Return the synthetic log; its last joint follows another, plus `own_deg` of own motion."""
+    """Return the synthetic log; its last joint follows another, plus its own `own_deg` degrees."""
     log = made_up()
     others, fresh = log.angles[:, :3] - log.angles[:, :3].mean(axis=0), log.angles[:, 3]
     fresh = fresh - fresh.mean()
@@ -177,7 +177,7 @@ def test_motors_are_optional_in_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
 @pytest.mark.parametrize("finger_seed", [0, 7])
 def test_every_joint_moves_far_and_on_its_own(actions: str, finger_seed: int) -> None:
-    """Joints cover half of their range, the knuckle a third, and move independently."""
+    """Joints cover half of their range, knuckle flexion a third, and move independently."""
     log, _ = recorded(10.0, gap="real-like", finger_seed=finger_seed, actions=actions)
     low, high = np.percentile(log.angles, [5.0, 95.0], axis=0)
     share = (high - low) / (JOINT_RANGE[:, 1] - JOINT_RANGE[:, 0])

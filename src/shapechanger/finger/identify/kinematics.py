@@ -116,8 +116,8 @@ def robust_covariance(
 def interval_quantile(times: int, control_dt: float) -> float:
     """Half width of a 95 % interval, in standard errors of `robust_covariance`.
 
-    It is above 1.96, because the covariance is estimated from few periods of half a second, by the
-    cubic of Kiefer & Vogelsang 2005 (Econometric Theory 21:1130, table 1, Bartlett's weights).
+    It is above 1.96, because the covariance is estimated from few periods of half a second. The
+    cubic is from Kiefer & Vogelsang 2005 (Econometric Theory 21:1130, table 1, Bartlett's weights).
     """
     b = min(1.0, _lags(control_dt) / times)
     return float(np.polyval([-0.5324, 0.4160, 2.9694, 1.9600], b))

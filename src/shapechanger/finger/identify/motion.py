@@ -95,7 +95,7 @@ class Motors:
 
 
 def fit_motors(log: FingerLog) -> Motors:
-    """Fit lag, delay and strength of motors to a log; the strength is relative to known motors."""
+    """Fit lag, delay and strength of motors to a log; strength 1 is the known or nominal one."""
     known = log.motors or NOMINAL
     most = np.array(known.most_tension)
     drive = drive_of(log.actions, NOMINAL)
@@ -225,12 +225,12 @@ def cut_windows(
 
 
 def steps_per_period(control_dt: float, timestep: float) -> int:
-    """Smallest number of simulation steps per control period, s, that are at most `timestep`, s."""
+    """Smallest number of equal steps in a control period, s, each at most `timestep`, s."""
     return math.ceil(control_dt / timestep - 1e-6)
 
 
 def with_motors(motors: Motors, known: FingerParameters | None) -> FingerParameters:
-    """The nominal finger with the motors of a known finger, or with the fitted motors for None."""
+    """The nominal finger with the fitted lag and the motors `known`, or fitted motors for None."""
     nominal = NOMINAL.replace(motor_lag=motors.lag)
     if known is None:
         most = motors.strength * np.array(NOMINAL.most_tension)
@@ -271,7 +271,7 @@ def fit_dynamics(
 
 
 class _MotionFit:
-    """Residuals of the simulated motion; parameters are logarithms of values over `FACTORS`."""
+    """Residuals of the simulated motion; parameters are logarithms of factors on `FACTORS`."""
 
     def __init__(
         self, sysid: Any, log: FingerLog, kinematics: Kinematics, motors: Motors, last: int | None

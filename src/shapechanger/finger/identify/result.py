@@ -149,7 +149,7 @@ class IdentifiedFinger:
 
     @property
     def arm_intervals(self) -> NDArray[np.float64]:
-        """95 % intervals of the moment arms, m, (7, 4, 2); 0 if a tendon crosses no joint."""
+        """95 % intervals of the moment arms, m, (7, 4, 2); 0 if a tendon does not cross a joint."""
         ends = np.zeros((len(TENDONS), len(JOINTS), 2))
         for estimate in self.arms:
             _, tendon, joint = estimate.name.split("/")
