@@ -46,7 +46,7 @@ def test_sleep_changes_no_drive(vehicle: str, monkeypatch: pytest.MonkeyPatch) -
         data = world.data
         states.append(tuple(x.tobytes() for x in (data.qpos, data.qvel, data.geom_xpos)))
         world.put(world.pose)
-        _drive(world, {}, 30.0)  # After this time at rest, other bodies sleep.
+        _drive(world, {}, 30.0)  # Any other body sleeps after this time at rest.
         _drive(world, _AHEAD[vehicle], 0.1)
         states[-1] += (world.data.qpos.tobytes(),)
     assert states[0] == states[1]
@@ -56,7 +56,7 @@ def test_sleep_changes_no_drive(vehicle: str, monkeypatch: pytest.MonkeyPatch) -
 def test_a_coarse_world_with_fine_steps_is_identical(
     vehicle: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Until the hull hits a wall, poses do not depend on contacts of wheels with walls."""
+    """Until the hull hits a wall, ignoring contacts of wheels with walls changes no pose."""
     monkeypatch.setattr(world_module, "_COARSE_DT", SIM_DT)
     poses: list[Pose] = []
     for coarse in (False, True):

@@ -272,7 +272,7 @@ def stated(policy: CameraPolicy, env: EnvRef, steps: int, seed: int, **data: Any
 
 
 STUDENT_STEPS: Final = 7200
-"""Default steps of a student: six minutes, a third of which the teacher drives."""
+"""Default steps of a student: six minutes, of which the teacher drives a third."""
 
 STUDENT_CLONING: Final = CloneSettings(held_out=0.0, passes=50.0, most_steps=3000)
 """Default settings with which a student clones its teacher."""
@@ -296,7 +296,7 @@ def train_student(
 ) -> CameraPolicy:
     """Train a camera policy for an env, such as `Car`, from a teacher, such as of `CarRanges`.
 
-    The teacher drives a third of the steps, and the student the others. After each episode,
+    The teacher drives a third of the steps, and the student drives the rest. After each episode,
     `on_steps` is called with the number of steps so far. Raises a StudyError if the teacher does
     not fit the env.
     """

@@ -43,12 +43,12 @@ _COARSE_DT: Final = 2.0 * SIM_DT
 _ROUNDING_S: Final = 1e-9
 # Number of cached courses: the layout takes 70 ms, and the path 60 ms; a model takes 5 MB.
 _KEPT_COURSES: Final = 64
-# Views from outside are a little above, at a height on the vehicle, m. At MuJoCo's field of view of
-# 45 degrees a sphere of radius 1 fills the height at a distance of 2.6.
+# Views from outside look down at a point of the vehicle at this height, m. At MuJoCo's field of
+# view of 45 degrees a sphere of radius 1 fills the height at a distance of 2.6.
 _ABOVE_RAD: Final = math.radians(-20.0)
 _LOOKED_AT_M: Final = 0.06
 _DISTANCE_PER_REACH: Final = 3.0
-# Farthest distance between two updates of the progress, m: below the limit of `CourseProgress`.
+# Largest distance between two updates of the progress, m: below the limit of `CourseProgress`.
 _PROGRESS_M: Final = 0.5
 
 

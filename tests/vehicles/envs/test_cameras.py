@@ -67,7 +67,7 @@ def _seen(by: str, folder: Path, camera: CameraPlan) -> NDArray[np.uint8]:
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize("by", ["room", "waypoints", "waypoints, sensed", "ranges", "twin"])
 def test_every_simulation_has_the_camera_of_the_profile(by: str, tmp_path: Path) -> None:
-    """Warped frames of other cameras agree with warped frames of lab-car."""
+    """Warped frames of other cameras agree with warped frames of lab-car's camera."""
     expected = _seen(by, tmp_path, _LAB).astype(np.float64)
     # The difference of the image from itself, shifted by a pixel, is the scale of rounding.
     aside = np.abs(expected[:, 1:] - expected[:, :-1]).mean()

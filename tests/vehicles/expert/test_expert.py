@@ -82,7 +82,7 @@ def test_signed_distances_of_a_square() -> None:
 
 @given(station=st.floats(-200.0, 200.0))
 def test_at_inverts_nearest(station: float) -> None:
-    """The station of the point at a station is this station, up to whole laps."""
+    """`nearest` finds the station of a point that `at` returned, up to whole laps."""
     x, y = _RING.at(station)
     spot = _RING.nearest(x, y)
     assert abs(_RING.ahead_by(station, spot.station)) < 1e-6

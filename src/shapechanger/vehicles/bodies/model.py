@@ -170,7 +170,7 @@ class Rolling(BoundVehicle):
 # counter-clockwise. X and Y are forces, N, and N is the moment about the middle, N·m. Names follow
 # T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., Wiley 2021.
 _WATER_DENSITY: Final = 1000.0  # kg/m3, fresh
-# Share of the speed gained behind a propeller that the water has gained at the rudder: 0.6 in H.
+# Share of the speed that a propeller adds to the water that is reached at the rudder: 0.6 in H.
 # Yasukawa, Y. Yoshimura, Introduction of MMG standard method, J. Mar. Sci. Technol. 20 (2015).
 _CONTRACTED: Final = 0.6
 
@@ -345,7 +345,7 @@ class Floating(BoundVehicle):
         return Motion(x, y, math.remainder(heading, math.tau), ahead, left, r)
 
     def travelled_m(self) -> float:
-        """Distance through the water since `place`; astern counts down."""
+        """Distance through the water since `place`, m; going astern reduces it."""
         return self._log_m
 
     def _state(self) -> tuple[float, float, float, float, float, float]:

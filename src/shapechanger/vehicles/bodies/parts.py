@@ -122,7 +122,7 @@ class DcMotor:
         return self.torque_per_current * self.volts_per_speed / self.resistance
 
     def geared(self, ratio: float, efficiency: float = 1.0) -> DcMotor:
-        """The motor with one more gear stage, in which `ratio` turns of the shaft make one turn."""
+        """The motor with one more gear stage, whose shaft turns once for `ratio` turns."""
         return replace(
             self,
             volts_per_speed=self.volts_per_speed * ratio,

@@ -43,7 +43,7 @@ ObstacleKind = Literal[
 class Wall:
     """An upright rectangle.
 
-    Seen from `start` towards `end`, the lane is on the left; only that side is ever visible.
+    Seen from `start` towards `end`, the lane is on the left; vehicles see only that side.
     """
 
     start: tuple[float, float]  # x and y, m.

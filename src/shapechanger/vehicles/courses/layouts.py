@@ -43,7 +43,7 @@ from shapechanger.vehicles.courses.geometry import (
 _SPACING_M: Final = 0.1  # Distance between the points of a route.
 _DOOR_M: Final = 0.9 + 2 * 0.06  # Width of a door with its frame.
 _RECESS_M: Final = 0.15  # Depth of a recessed door.
-_PLAIN_M: Final = (0.4, 2.4)
+_PLAIN_M: Final = (0.4, 2.4)  # Range of the length of plaster between two panels.
 
 # Panels in the plaster: surface, share of the panels, and range of widths, m.
 _PANELS: tuple[tuple[Surface, float, tuple[float, float]], ...] = (
@@ -114,7 +114,7 @@ def _leg(rng: np.random.Generator, start: Array, end: Array, height: float) -> I
 
 _CEILING_M: Final = 2.5  # Height of the ceiling, and of every wall.
 _PITCH_M, _WIDTH_M, _LENGTH_M = (4.0, 6.0), (1.8, 2.4), (40.0, 90.0)
-_GAP_M: Final = 0.9
+_GAP_M: Final = 0.9  # Smallest gap next to an obstacle.
 
 # Furniture of common sizes along the walls; the width is the depth from the wall.
 _FURNITURE = (
@@ -236,7 +236,7 @@ def _furnish(
 def _plant(
     rng: np.random.Generator, obstacles: LaneObstacles, corners: Array, inward: Array, along: Array
 ) -> None:
-    """Add plants and bins in some corners that recede; `inward` points from there into the lane."""
+    """Add plants and bins in some corners that recede; `inward` vectors point into the lane."""
     for corner, way, s in zip(corners, inward, along, strict=True):
         if rng.random() < 0.25:
             size = _FURNITURE[3] if rng.random() < 0.7 else _FURNITURE[1]

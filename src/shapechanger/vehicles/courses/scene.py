@@ -58,7 +58,7 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     def show(
         name: str, mesh: QuadMesh, colour: Colour, image: str = "", opacity: float = 1.0
     ) -> None:
-        """Add a mesh with the texture of its name, or another one, lit by its own light only."""
+        """Add a mesh, lit by its own light only, with a texture, by default the one of its name."""
         if not mesh:
             return
         name, image = f"world/{name}", image or name

@@ -29,7 +29,7 @@ _MIRRORED: Final = np.array([[0, 2, 1], [0, 3, 2]])
 class QuadMesh:
     """Quads with texture coordinates and light.
 
-    Each has four corners, counter-clockwise seen from its front; its back is invisible. Texture
+    Corners of a quad are counter-clockwise seen from its front; its back is invisible. Texture
     coordinates are u to the right and v down, from 0 to 1.
     """
 
@@ -255,7 +255,7 @@ class Surfaces:
         return origin[:, None, :] + size * np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
 
     def _open_water(self, tiles: Array) -> Array:
-        """Corners of four large tiles around the others, up to the far shore, m, (4, 4, 2)."""
+        """Corners of four large tiles around other tiles, up to the far shore, m, (4, 4, 2)."""
         (x0, y0), (x1, y1) = tiles.min(axis=(0, 1)), tiles.max(axis=(0, 1))
         middle, radius = extent(self._course)
         (left, bottom), (right, top) = middle - radius, middle + radius

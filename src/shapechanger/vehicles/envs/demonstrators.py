@@ -39,12 +39,12 @@ _THROTTLE_SD: Final = 0.1  # Standard deviation of the wandering of the throttle
 class Demonstrator:
     """Driver that makes mistakes and recovers from them, so that demonstrations show corrections.
 
-    The vehicle executes the disturbed action, and the driver's own is recorded (M. Laskey et al.,
-    "DART: Noise Injection for Robust Imitation Learning", CoRL 2017). There are two kinds of noise:
-    slow wandering (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion",
+    The vehicle executes the disturbed action, and the driver's own action is recorded (M. Laskey et
+    al., "DART: Noise Injection for Robust Imitation Learning", CoRL 2017). There are two kinds of
+    noise: slow wandering (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion",
     Physical Review 36, 1930) and rare jerks of the steering. `begin` is called at the beginning of
     an episode, and returns the driver. `sway` is the standard deviation of the wandering of the
-    steering; jerks are up to three times as large. By default it is what the vehicle can correct.
+    steering; jerks are up to three times as large. By default it is in the vehicle's `Traits`.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ _BEARING_SWAY: Final = 0.18
 
 
 def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
-    """Return an expert with waypoints as actions: the bearing of the free way, and the speed."""
+    """Return an expert with waypoints as actions: the bearing of the path ahead, and the speed."""
 
     def begin() -> Driver:
         expert = CourseExpert(world.course, world.vehicle.name, path=world.path())

@@ -83,7 +83,7 @@ def simulated_robot(
     `robot` is the path or name of its profile; None for `lab-` followed by the vehicle. `size`,
     pixels, and `steering` replace the profile's.
     """
-    vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
+    vehicle_model(vehicle)  # First, so that an unknown vehicle is not called a missing profile.
     named = f"lab-{vehicle}" if robot is None else os.fspath(robot)
     found = lab_robots().get(named) or ROBOTS.load("profile")(named)
     plan: GuardPlan = found.plan
@@ -202,7 +202,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         options = options or {}
         require_known("option of reset", _OPTIONS, *options)
         world, rng = self.world, self.np_random
-        # Given options are drawn, too, so that other draws do not depend on them.
+        # Seeds are drawn even if options give them, so that later draws stay the same.
         course = self._seeds[int(rng.integers(len(self._seeds)))]
         start = int(rng.integers(2**31))
         look = Look.random(world.course.world, rng) if self._randomise else None

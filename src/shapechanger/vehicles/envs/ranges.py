@@ -43,7 +43,7 @@ _COURSES: Final = range(48)  # Courses for training, few enough to keep their co
 
 
 class MeanOutputs:
-    """Mean outputs of control periods, from rest, without sensors and the steps of outputs.
+    """Mean outputs over control periods, from rest; sensors and rounding are left out.
 
     Stalls and deadlines are not simulated; a simulated command never misses a deadline.
     """
@@ -147,8 +147,8 @@ class RangesEnv(DriveEnv):
     | 10  | `yaw_rate`     | -15 | 15  | rad/s |
 
     ## Reward
-    `DriveReward` with a metre of progress along the course for a metre forward, minus 3 for each
-    collision by default, and minus 1 for each second of standing. `reward_near` is 0 at clearances
+    `DriveReward`, which counts metres of progress along the course, minus 3 for each collision by
+    default, and minus 1 for each second of standing. `reward_near` is 0 at clearances
     of 0.35 m and more, and falls linearly to -3 per second at contact.
 
     ## Start

@@ -40,7 +40,7 @@ _Read = Callable[[int, float], dict[str, float]]
 
 
 class WheelEncoder:
-    """Speed from the last edges of an encoder: of one count, or two edges of one channel."""
+    """Speed from an encoder's last edges: those of one count, or two of a single channel."""
 
     def __init__(self, settings: dict[str, Any], world: MujocoWorld) -> None:
         count_m: float = settings["wheel_m"] / settings["counts_per_turn"]
@@ -179,8 +179,8 @@ _COUNTS: Final = 4096  # Counts of its period.
 class SensedVehicle:
     """A vehicle with the limits and sensors of a robot, which starts at rest.
 
-    Pins, chips, link and emergency stops are simulated only in a robot's twin, which drives to the
-    same place.
+    Pins, chips, link and emergency stops are simulated only in a robot's twin, which reaches the
+    same positions.
     """
 
     def __init__(self, plan: GuardPlan, world: MujocoWorld) -> None:
@@ -244,7 +244,7 @@ class SensedVehicle:
     def _read(
         self, sensors: Sequence[tuple[str, _Read]], quantities: dict[str, float], direction: float
     ) -> None:
-        """Add readings, keyed by quantity; if two sensors measure speed, the smaller counts."""
+        """Add readings, keyed by quantity; of two measured speeds, the smaller one counts."""
         for name, read in sensors:
             for quantity, value in read(self.now_ns, direction).items():
                 if quantity == "speed" and abs(value) >= abs(quantities.get(quantity, math.inf)):

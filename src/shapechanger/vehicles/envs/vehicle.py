@@ -33,8 +33,8 @@ class VehicleEnv(DriveEnv):
 
     A profile defines the robot. Its caps, slew, reflexes and sensors act as on hardware, by the
     functions of the guard. Pins, chips and the link are not simulated here, but a robot's twin
-    emulates them, and drives to the same place. `shapechanger/RemoteVehicle-v1` is the same task on
-    hardware or on a twin.
+    emulates them, and reaches the same positions. `shapechanger/RemoteVehicle-v1` is the same task
+    on hardware or on a twin.
 
     ## Action space
     `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. An action lasts one control
@@ -83,8 +83,8 @@ class VehicleEnv(DriveEnv):
         reward: Weights that replace the profile's, keyed by name.
         courses: Courses that `reset` samples: "training", "held-out" or seeds.
         randomise: Whether `reset` also samples light, textures and the camera's pose.
-        put_back: Whether to put the vehicle back on the lane after a collision, like a person next
-            to it. A collision then does not end the episode.
+        put_back: Whether to put the vehicle back on the lane after a collision, as a person next to
+            it would. A collision then does not end the episode.
         lenses: Impairments of the camera, such as ("night", "dirt"); see
             `shapechanger.vehicles.cameras.camera`.
         render_mode: "rgb_array" for `render` to return the newest frame.

@@ -36,7 +36,7 @@ _OVERLAP_M: Final = 12.0
 _ROUNDS: Final = 150
 _RELAXATION: Final = 1.6
 _SPACING_M: Final = 0.1  # Approximate distance between the points of a path.
-# Weight of the preferred offsets, 1/m^4: a curvature of 1/m costs as much as `1 / sqrt(_PULL)` m.
+# Weight of preferred offsets, 1/m^4: `1 / sqrt(_PULL)` m off costs as much as a curvature of 1/m.
 _PULL: Final = 0.02
 _ATTEMPTS: Final = 8  # Largest number of attempts to move a line away from obstacles.
 
@@ -115,7 +115,7 @@ class _Lattice:
         """Bounds of the offset at each station, m, with the preferred clearance where it fits."""
         low, high = np.empty(len(way)), np.empty(len(way))
         for i, k in enumerate(way):
-            # The bounds always include the way, so the bounds of neighbours overlap.
+            # The bounds always include the offset of the way.
             clear = float(self._clearance[i, k])
             least = self._least_m + extra[i]
             wanted = min(max(self._comfort_m, least), clear - 0.02 + extra[i])

@@ -38,7 +38,7 @@ class RemoteWaypointEnv(WaypointView):
         options: Further arguments of `RemoteVehicleEnv`, except `size`, `state` and `image`.
 
     Attributes:
-        response: Response of the vehicle to steering; None before the first reset.
+        response: Response of the vehicle to steering; None before it is given or measured.
 
     Raises:
         RobotRefused: If the robot is not a vehicle, the geometry of its camera is unknown, its
