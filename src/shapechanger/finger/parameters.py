@@ -62,7 +62,7 @@ class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             `control_hz`.
         slew_per_s: Fastest rise of a tension, in ranges from the least to the most tension per
             second; None for no limit.
-        slew_down_per_s: Fastest fall of a tension, in such ranges per second; None for no
+        slew_down_per_s: Fastest fall of a tension, in ranges per second; None for no
             limit.
         tension_step: Resolution of the tensions, N, which are rounded down; 0 for none.
 

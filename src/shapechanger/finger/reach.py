@@ -77,7 +77,7 @@ class FingerReachEnv(FingerEnv):
     | 36    | `target/dy`           | -inf     | inf    | m     |
     | 37    | `target/dz`           | -inf     | inf    | m     |
 
-    With `goal=True` a Dict of `observation` (32, the same without the target), `achieved_goal` (3)
+    With `goal=True` a Dict of `observation` (32, as above without the target), `achieved_goal` (3)
     and `desired_goal` (3), for learners with hindsight.
 
     ## Reward

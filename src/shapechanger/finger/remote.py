@@ -267,8 +267,8 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
 
     ## Action space
-    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`, so a script runs on both envs if its id
-    is changed. The env converts commands to tensions, by the newest lengths and speeds of the
+    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`, so a script runs on both envs if the
+    id is changed. The env converts commands to tensions, by the newest lengths and speeds of the
     tendons at the servos. A command lasts 0.02 s.
 
     ## Observation space
@@ -285,8 +285,8 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     ## Start
     The operator arms a rig; the env arms a twin. For up to 1 s, the env moves the finger to the
     start of `Finger-v1` for the same seed. The measured error is a few hundredths of a radian, or
-    more if gears stick. The target is the same. Servos of the env's own twin are cool at the start;
-    servos of a rig need pauses, or they get hot and switch off.
+    more if gears stick. The target is the same as there. Servos of the env's own twin are cool at
+    the start; servos of a rig need pauses, or they get hot and switch off.
 
     ## End
     Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost

@@ -120,7 +120,7 @@ def test_a_command_acts_in_the_period_that_ends_with_its_row() -> None:
 
 
 def test_motors_follow_with_their_lag() -> None:
-    """After one lag, 1/e of a step is left; before the log, the first command acts."""
+    """After one lag, 1/e of a step remains; the first command of a log also acts before the log."""
     made = stepped().activations(0.0, 0.001, 1100, 0.0, 0.030)
     assert made[979, 3] == pytest.approx(0.0, abs=1e-9)
     assert made[1009, 3] == pytest.approx(1.0 - np.exp(-1.0), abs=1e-9)
