@@ -294,7 +294,7 @@ def train_student(
     settings: CloneSettings = STUDENT_CLONING,
     on_steps: Callable[[int], None] = lambda steps: None,
 ) -> CameraPolicy:
-    """Train a camera policy for an env, such as `Car`, from a teacher, such as of `CarRanges`.
+    """Train a camera policy for an env, such as `Car`, from a teacher, a policy of `CarRanges`.
 
     The teacher drives a third of the steps, and the student drives the rest. After each episode,
     `on_steps` is called with the number of steps so far. Raises a StudyError if the teacher does

@@ -35,7 +35,7 @@ _LARGEST: Final = 4096  # Width and height; software renderers draw no larger im
 
 
 class _Renderer:
-    """Renders views of models; the first image of another model loads its textures.
+    """Renders views of models; the first image of a new model loads the model's textures.
 
     The OpenGL context is opened for the first image. A process that has only built a camera, such
     as the parent of an `AsyncVectorEnv`, can therefore be forked.

@@ -123,7 +123,7 @@ _PERIOD: Final = {
 # Width of textures that show one object, which is fitted into its wall, m.
 _WHOLE: Final = {"door": 1.0, "window": 1.8, "board": 2.6, "glass": 1.4}
 _CLAD: Final = 0.2  # Share of the plastered walls with wooden panels.
-# Height of the brick texture, m, which repeats; the others are stretched to the wall.
+# Height of the brick texture, m, which repeats; other textures are stretched to the wall.
 _BRICK_HEIGHT: Final = 1.8
 _DOOR_HEIGHT: Final = 2.1  # Height of a door with its frame, m; plaster is above it.
 # Longest patch of a wall, m: shorter than the distance between two lamps, over which light varies.
