@@ -94,7 +94,7 @@ def test_steps_equal_gymnasiums(case: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in dict(_CASES.values()) if name != "Ant"])
-def test_the_others_start_like_gymnasiums(name: str) -> None:
+def test_other_envs_start_with_gymnasiums_noise(name: str) -> None:
     """Starts have Gymnasium's noise, except where limits or the floor forbid it."""
     untouched = 0
     with gym.make(f"shapechanger/{name}-v1") as made, gym.make(f"{name}-v5") as other:

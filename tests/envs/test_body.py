@@ -359,7 +359,7 @@ def test_invalid_seeds_are_refused(seed: Any) -> None:
 
 
 def test_legs_are_in_the_order_of_the_motors() -> None:
-    """Legs follow the motors, with the given directions."""
+    """`LEGS` has the order of the motors and the directions of the legs."""
     model = built(ant_spec())
     motors = [model.actuator(i).name for i in range(model.nu)]
     assert motors == [f"{joint}_{leg}" for leg in LEGS for joint in ("hip", "ankle")]

@@ -28,7 +28,7 @@ def test_no_two_ids_have_the_same_body() -> None:
 
 
 def test_ids_have_the_bodies_of_their_names() -> None:
-    """An id gives the same model as its family's first id with that body."""
+    """An id gives the same model as the id of its family, such as `Ant`, with its body."""
     for env_id, entry in CATALOGUE.items():
         first = f"shapechanger/{entry.family}-v1"
         assert fingerprint(_model(env_id)) == fingerprint(_model(first, body=entry.name))
@@ -39,7 +39,7 @@ def test_ids_have_the_bodies_of_their_names() -> None:
     ["BigAnt", "BigAnt-v1", "shapechanger/BigAnt-v1", "shapechanger:shapechanger/BigAnt-v1"],
 )
 def test_an_entry_is_found_by_any_form_of_its_name(name: str) -> None:
-    """Short names, versions and module prefixes are accepted; others have a nearest name."""
+    """Short names, versions and module prefixes are accepted; errors suggest the nearest name."""
     assert find(name) is CATALOGUE["shapechanger/BigAnt-v1"]
     with pytest.raises(UnknownName, match=r"'BigAnd'. Did you mean 'BigAnt'\? There are: .*Ant"):
         find(name.replace("BigAnt", "BigAnd"))

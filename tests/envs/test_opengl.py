@@ -1,4 +1,4 @@
-"""Selection of the OpenGL library, each in a new interpreter."""
+"""Selection of the OpenGL library; each script runs in a new interpreter."""
 
 from __future__ import annotations
 

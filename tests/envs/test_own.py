@@ -70,7 +70,7 @@ def test_a_robot_walks(dog: Path) -> None:
     _, reward, _, _, info = env.step(np.array([1.0, 0.5], np.float32))
     assert info["x_velocity"] == pytest.approx((inner.data.xpos[1, 0] - before) / 0.02, abs=0.05)
     assert info["reward_alive"] == 1.0
-    # Half of the action's ranges: 1 of -2 to 1 is the end, 0.5 of -1 to 1 half of it.
+    # Scaled to -1 to 1, the action is 1 (1 in the range -2 to 1) and 0.5 (0.5 in -1 to 1).
     assert info["reward_control"] == pytest.approx(-0.1 * (1.0 + 0.25))
     assert reward == sum(info[f"reward_{term}"] for term in ("forward", "alive", "control"))
     with pytest.raises(ValueError, match="finite"):
@@ -106,7 +106,7 @@ def test_a_home_is_kept_joint_by_joint(dog: Path, body: Edit, angles: list[float
     assert (_inner(env).data.qpos[2] == 1.25) == isinstance(body, StartHeight)
 
 
-def test_without_a_home_joints_start_inside_their_limits(dog: Path) -> None:
+def test_without_a_home_joints_start_in_the_models_pose(dog: Path) -> None:
     """Without a keyframe, joints start in the model's own pose."""
     dog.write_text(DOG[: DOG.index("  <keyframe>")] + "</mujoco>")
     env = shapechanger.from_mjcf(dog, reset_noise_scale=0.0)
@@ -152,8 +152,8 @@ def test_every_number_can_be_read(dog: Path) -> None:
         robot["front/angel"]
 
 
-def test_an_up_axis_is_that_of_the_start(tmp_path: Path) -> None:
-    """A robot is upright at its start, even if the frame of its trunk lies on its side."""
+def test_a_robot_is_upright_at_its_start(tmp_path: Path) -> None:
+    """A robot is upright at its start even if the frame of its trunk lies on its side."""
     path = tmp_path / "dog.xml"
     path.write_text(DOG.replace('qpos="0 0 .47 1 0 0 0', 'qpos="0 0 .47 .7071 .7071 0 0'))
     inner = _inner(shapechanger.from_mjcf(path, Rear))

@@ -158,7 +158,7 @@ def test_a_file_without_a_valid_robot_is_refused(path: str, sentence: str) -> No
 
 @each_robot
 def test_a_robot_starts_with_closed_loops_and_steps(robot: _Robot) -> None:
-    """The start is inside the limits, with equalities as closed as in the file; actions move it."""
+    """The start is inside the limits, with equalities closed as in the file; steps are finite."""
     env = robot.make()
     inner: Any = env.unwrapped
     model, data = inner.model, mujoco.MjData(inner.model)

@@ -356,7 +356,7 @@ def test_floors_are_grey_and_shadows_are_not_black(shadows: bool) -> None:
 
 
 def test_floors_do_not_end(ant: Any) -> None:
-    """An ant that has walked for a kilometre is still on tiles; the floor of contacts stays."""
+    """An ant that has walked for a kilometre is on tiles; the floor for contacts does not move."""
     data = ant.unwrapped.data
     near = ant.render().astype(int)
     repeats = 80.0 / 60.0  # Width of the floor, m, divided by the number of repeats of its tiles.
@@ -380,7 +380,7 @@ def _textured(**arguments: Any) -> Any:
 
 
 def test_only_textures_differ_without_rendering() -> None:
-    """All other arrays equal an env's with rendering."""
+    """All other arrays are equal with and without rendering."""
     plain, drawn = _textured(), _textured(render_mode="rgb_array")
     assert plain.ntexdata < 0.3 * drawn.ntexdata
     flat = plain.tex_type == mujoco.mjtTexture.mjTEXTURE_2D  # Floors are unchanged.
@@ -399,7 +399,7 @@ def test_only_textures_differ_without_rendering() -> None:
     [(256, {}, False), (257, {}, True), (64, {"shadows": True}, True)],
 )
 def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shadows: bool) -> None:
-    """Frames of up to 256 pixels have no shadows by default; copies of the env render the same."""
+    """Frames of up to 256 x 256 pixels have no shadows; copies of the env render the same."""
     more = {"render_mode": "rgb_array", "width": size, "height": size, **arguments}
     with gym.make("shapechanger/Ant-v1", **more) as env:
         quality = env.unwrapped.model.vis.quality

@@ -22,7 +22,7 @@ from shapechanger.envs.runners import HopperEnv
 
 
 class HighHopper(HopperEnv):
-    """The hopper of any body, whose reward is the height of its torso over where it stands."""
+    """A hopper of any body, rewarded for its torso's height divided by its standing height."""
 
     def _get_rew(self, x_velocity, action):
         height = float(self.data.qpos[1]) / self.standing_height

@@ -1,4 +1,4 @@
-"""Small models shared by tests of comparisons."""
+"""A model with nearly all kinds of elements, and Gymnasium's models, for tests."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ _WRIST = """
 
 
 class Swing:
-    """Pendulum with a motor, and an optional second one at its wrist."""
+    """Pendulum with a motor, and optionally a wrist with a second motor."""
 
     def __init__(
         self,
@@ -117,6 +117,6 @@ def broken(env: Any) -> Wrapper:
 
 
 def late(env: Any, after: int, offset: float) -> Wrapper:
-    """Return an env that adds to its observations after some of them."""
+    """Return an env that adds `offset` to its observations after the first `after` of them."""
     count = itertools.count()
     return Wrapper(env, lambda seen: seen + (offset if next(count) >= after else 0.0))

@@ -297,8 +297,8 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     ) -> tuple[Any, dict[str, Any]]:
         """Return reward and info as Gymnasium's `_get_rew`, for one ant or an array of ants.
 
-        The place is the torso's, x, y and distance from the origin, m; the velocity is the main
-        body's along x and y, m/s.
+        `place` is the torso's x, y and distance from the origin, m; `velocity` is the main body's
+        along x and y, m/s.
         """
         (x, y, distance), (x_velocity, y_velocity) = place, velocity
         forward_reward = x_velocity * self._forward_reward_weight
@@ -395,7 +395,7 @@ AntEnv.tuned = AntEnv
 def is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
     """Return whether a torso at a height z, m, with x and y of its quaternion, is healthy.
 
-    Its height is from low to high, m, and its up axis above the horizon.
+    A healthy torso is between low and high, m, and its up axis points above the horizon.
     """
     return (low <= z) & (z <= high) & (1.0 - 2.0 * (x * x + y * y) > 0.0)
 

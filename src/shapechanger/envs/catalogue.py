@@ -259,8 +259,8 @@ def short_name(env_id: str) -> str:
 def allow_own_modules(*names: str | None) -> None:
     """Let names such as `my_methods:warm-start` import modules of the current folder.
 
-    Only names that the user gives may import modules: a class named in a policy's file must not be
-    found in the same folder.
+    Call it only with names that the user gives: a class name in a policy's file must not import
+    modules of the folder.
     """
     here = str(Path.cwd())
     own = any(name and (":" in name or name.endswith(".toml")) for name in names)
@@ -274,7 +274,7 @@ def default_learner(env: EnvRef) -> str:
 
 
 def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
-    """Return a vehicle's env with the options of studies, which put it back after a collision."""
+    """Return an env with the options of studies: lenses, and vehicles put back after collisions."""
     if lenses and env.id not in VEHICLE_ENVS:
         raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
     if env.id not in _DRIVES:

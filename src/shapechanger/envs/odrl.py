@@ -8,18 +8,20 @@ ODRL's own files of these robots were not available. All 80 targets were read on
 conversions by third parties, which agree on each target that was read from both:
 
 - `comp_flow_jax/envs/assets_v3/*.xml` of github.com/xingcw/CompositeFlow, commit 322fe9a: ODRL's
-  files, written by MuJoCo 2.3.3 with six digits (ants, half cheetahs, and some of the other two).
-  ODRL's files of the hopper and the walker have `coordinate="global"`, which MuJoCo has removed.
+  files, written by MuJoCo 2.3.3 with six digits (ants, half cheetahs, and some hoppers and
+  walkers). ODRL's files of the hopper and the walker have `coordinate="global"`, which MuJoCo has
+  removed.
 - `env/mujoco/assets/{hopper,walker2d}_*.xml` of
   github.com/shivambhagat79/off-dynamics-explorative-rl, commit b13843f: hoppers and walkers in
   local coordinates and round numbers.
 
 The tasks and their levels come from `envs/mujoco/call_mujoco_env.py` of
 github.com/OffDynamicsRL/off-dynamics-rl, commit d1a69cd. Where only six digits are known, such as a
-half-length of 0.0777817, they are replaced by the round end points that give it, (0, 0, 0) and
+half-length of 0.0777817, the edits have the round end points that give this number, (0, 0, 0) and
 (0.11, 0, -0.11). Every half cheetah weighs 14 kg, because Gym's file has `settotalmass`. Files
 written by MuJoCo lack this setting, but `envs/mujoco/assets/halfcheetah_morph_easy.xml` of
-github.com/shivambhagat79/off-dynamics-rl, commit 995bf26, a changed thigh of ODRL, has kept it.
+github.com/shivambhagat79/off-dynamics-rl, commit 995bf26, ODRL's body with a changed thigh, has
+kept it.
 
 `odrl.json` has the edits, keyed by names such as `odrl-ant-friction-0.1`. Frictions apply to all
 geoms, except the hopper's floor; gravity is a factor of 9.81 m/s²; easy, medium and hard leave 0.8,

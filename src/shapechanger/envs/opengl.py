@@ -103,7 +103,7 @@ def _require_glfw() -> None:
                 glfw.default_window_hints()
         if window:
             glfw.destroy_window(window)
-    except ImportError as error:  # Its library is missing.
+    except ImportError as error:  # GLFW's library is missing.
         where = f" ({_first_line(error)})"
     if not window:
         raise RenderError(

@@ -218,9 +218,9 @@ class OwnRobotEnv(Reshapable, EzPickle):
       `shapechanger.morphology.pose.robot_bodies`. Trunk, standing height, noise and lift concern
       the robot only, and objects keep their start pose in the file.
     - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
-      at least a tenth of its range inside its limits; the feet stand above the floor, and coupled
-      joints and closed loops are closed as well as in the file. The standing height is the height
-      in this pose.
+      at least a tenth of its range inside its limits; the feet stand above the floor, and the
+      equations of coupled joints and closed loops hold as exactly as in the file. The standing
+      height is the height in this pose.
     - **End**: when the task ends it, or when the simulation diverges, with a reward of 0.
 
     Args:
@@ -311,8 +311,8 @@ class OwnRobotEnv(Reshapable, EzPickle):
     def _start_and_height(self, model: mujoco.MjModel) -> tuple[_Floats, float | None]:
         pose = start_pose(model)
         if self._home:
-            # Edits carry the keyframe along, so `StartHeight` and the poses of copied limbs are in
-            # it; joints that are new to it are left inside their limits.
+            # Edits change the keyframe too, so it has `StartHeight` and the poses of copied limbs;
+            # joints that it does not pose stay inside their limits.
             home = model.key(_HOME).qpos
             for j, at in enumerate(np.split(np.arange(model.nq), model.jnt_qposadr[1:])):
                 if model.joint(j).name in self._home or np.any(home[at] != model.qpos0[at]):
@@ -407,7 +407,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return self.data.xpos[self._trunk].copy()
 
     def seen(self, action: NDArray[Any], before: _Floats) -> RobotState:
-        """Return the state for a task after an action, with the trunk's place before it, m."""
+        """Return the state for a task after an action; `before` is the trunk's former place, m."""
         place = self.trunk_place()
         return RobotState(
             *(self.model, self.data, self.dt, place, (place - before) / self.dt),

@@ -163,7 +163,7 @@ def draw(
     """Return an image of a body in a pose (nq,), shape (height, width, 3).
 
     `reach` is the radius in view around the middle of the body, m: bodies drawn with the same reach
-    have the same scale. The model has a sky and a light, see `prepare_scene`.
+    have the same scale. The model must have a sky and a light, see `prepare_scene`.
     """
     if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
         raise RenderError(

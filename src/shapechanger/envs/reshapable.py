@@ -275,7 +275,7 @@ class Reshapable(MujocoEnv):
         self._started = True
 
     def _require_reset(self, method: str) -> None:
-        """Refuse a call before the first reset, also for a copy that was made during an episode."""
+        """Refuse a call before the first reset; a copy made during an episode must be reset too."""
         if not self._started:
             raise gym.error.ResetNeeded(
                 f"Cannot call env.{method}() before calling env.reset(): "

@@ -132,7 +132,7 @@ def median_index(study: Study, kind: str) -> int:
 def _play(
     scene: _Scene, distances: Mapping[str, float], shadows: bool, drives: bool
 ) -> tuple[list[NDArray[np.uint8]], float, str]:
-    """Return frames, their rate, and the default measure over them."""
+    """Return frames, their rate, Hz, and a text with the default measure over them."""
     size: dict[str, Any] = {}
     entry = CATALOGUE.get(scene.env.id)
     if not drives:

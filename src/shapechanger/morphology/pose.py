@@ -230,7 +230,7 @@ class StartRules:
         self.lift = trunk_lift(model)
         self._model = model
         limited = (model.jnt_type > int(_J.mjJNT_BALL)) & (model.jnt_limited != 0)
-        # A single tree is the robot: runners read these rules at each reset, so save the search.
+        # A single tree is the robot. Runners make these rules at each reset, so skip the search.
         self._robot = robot_bodies(model) if model.ntree > 1 else np.arange(model.nbody) > 0
         joints = np.flatnonzero(limited & self._robot[model.jnt_bodyid])
         self.lowest, self.highest = model.jnt_range[joints].T
@@ -324,7 +324,7 @@ class StartRules:
         return largest(equality_rows(self._model, data)[1])
 
     def _closed(self, drawn: _Array, start: _Array, goal: float, data: mujoco.MjData) -> _Array:
-        """Return a pose near a drawn one that violates the equalities by `goal` or the least."""
+        """Return a pose near `drawn` that violates the equalities by at most `goal`, if found."""
         is_inside = bool(np.all(start == self.keep_within_limits(start)))
         best, least = start.copy() if is_inside else drawn, np.inf
         for pose in self._tries(drawn, start, is_inside):

@@ -60,7 +60,7 @@ def step_together(
 
 
 def random_ant(seed: int) -> Body:
-    """Return an ant with random limbs, masses, gears, dampings and losses."""
+    """Return an ant with random limbs, masses, gears, dampings and frictions."""
     rng = np.random.default_rng(seed)
     edits: list[Any] = []
     for leg in LEGS:

@@ -15,7 +15,7 @@ from shapechanger.envs.stepping.tuned import ModelWatch, shared_by
 from tests.envs.stepping.side_by_side import same
 
 _MODEL = AntEnv().model
-# Every numeric array of the model, and every option.
+# Every array of the model except the pixels of textures.
 _ARRAYS = [
     name
     for name in dir(_MODEL)
@@ -162,8 +162,8 @@ def test_every_option_and_statistic_is_watched(part: str, name: str) -> None:
     assert watch.unedited()
 
 
-def test_an_unedited_model_is_unedited() -> None:
-    """Steps and resets change nothing; the digest follows from the numbers."""
+def test_steps_and_resets_are_no_edits() -> None:
+    """Steps and resets leave the model unedited; equal models have equal digests."""
     env = AntEnv()
     watch = ModelWatch(env.model)
     env.reset(seed=0)

@@ -34,7 +34,7 @@ def ants() -> Iterator[ThreadVectorEnv]:
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, None])
 def test_at_least_one_env_and_thread_are_needed(count: Any) -> None:
-    """`gymnasium.make_vec` and the class refuse the same."""
+    """`make_vec` and `ThreadVectorEnv` refuse numbers below one."""
     with pytest.raises(VectorEnvError, match=f"at least one env, got {count}"):
         shapechanger.make_vec("Ant", count)
     with pytest.raises(VectorEnvError, match="at least one env, got 0"):

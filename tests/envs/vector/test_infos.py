@@ -32,7 +32,7 @@ def _gymnasiums(infos: list[dict[str, Any]]) -> dict[str, Any]:
     return batch
 
 
-# The first env that has a key decides the type of its array, so each key has values of one type.
+# The first env that has a key decides the type of the key's array.
 _values: Any = st.fixed_dictionaries(
     {},
     optional={

@@ -15,7 +15,7 @@ import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
 from shapechanger.morphology import Mass, Stretch
 
-# One edited body besides the plain one of each family; ants and pendulums have names.
+# Bodies of each family with which worlds take turns: plain, named and edited ones.
 BODIES: dict[str, list[Any]] = {
     "Ant": ["Ant", "BigAnt", "AmputatedAnt", [Stretch("shank_1", 1.5), Mass("torso", 1.3)]],
     "ExtendedAnt": ["ExtendedAnt", "ExtendedAnt"],
@@ -71,7 +71,7 @@ def many(name: str, **arguments: Any) -> tuple[WarpVectorEnv, list[Any]]:
 
 
 def set_all(worlds: WarpVectorEnv, alone: Sequence[Any], states: Any) -> None:
-    """Put worlds of one batch and CPU envs into the same states, with cold solvers.
+    """Put worlds of one batch and CPU envs into the same states, without warm starts.
 
     Args:
         worlds: The worlds; their episodes begin.
@@ -104,7 +104,7 @@ def visited(env: Any, rng: np.random.Generator, count: int) -> list[tuple[Any, A
 
 
 def apart(found: Any, expected: Any) -> float:
-    """Return the largest difference of numbers, relative to 1 + their size; infinite ones agree."""
+    """Return the largest difference relative to 1 + the size; infinite numbers must be equal."""
     here = found.cpu() if isinstance(found, torch.Tensor) else found
     one, other = np.asarray(here, np.float64), np.asarray(expected, np.float64)
     assert one.shape == other.shape

@@ -34,7 +34,7 @@ def test_our_kernels_compile_for_an_h100(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_all_kernels_of_the_trial_compile_for_an_h100(
+def test_all_launched_kernels_compile_for_an_h100(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All kernels compile, including mujoco-warp's with the functions that we replace."""
@@ -55,7 +55,7 @@ def _both(axis: wp.vec3, frames: wp.array[wp.mat33]):
 
 
 def test_a_steep_capsule_still_needs_our_contacts() -> None:
-    """Our contacts have MuJoCo's axes; once mujoco-warp's have, `plane_capsule` can be deleted."""
+    """Our contacts have MuJoCo's axes; delete `plane_capsule` once mujoco-warp's have them too."""
     model = mujoco.MjModel.from_xml_string(_CAPSULE)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -37,8 +37,8 @@ def _actions(envs: Any, number: int) -> Any:
         ("InvertedDoublePendulum", 1, 0, {}),
         ("Humanoid", 1, 0, {}),
         ("Finger", 1, 0, {}),
-        # Paths are NumPy functions: two synchronisations read which worlds have started and where,
-        # and a copy writes the points of their paths.
+        # Paths are NumPy functions: a second synchronisation reads which worlds have started, and a
+        # copy writes the points of the paths.
         ("FingerTrack", 2, 1, {}),
     ],
 )

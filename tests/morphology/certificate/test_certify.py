@@ -267,7 +267,7 @@ def test_compiled_models_are_consistent(name: str) -> None:
 
 
 def test_a_mass_written_into_a_compiled_model_is_found() -> None:
-    """First stale constants, with values measured on Ant-v5, and then the inertia show the edit."""
+    """Stale constants show the edit; after `mj_setConst`, the unchanged inertia shows it."""
     model = asset("ant")
     model.body("torso").mass[:] = 3.0
     message = " ".join(inconsistencies(model))

@@ -111,7 +111,7 @@ _WRITTEN = [
 ]
 
 
-# pytest does not find tests by an id with the text of a field in it, and mutmut asks for them.
+# mutmut selects tests by id, which fails if the id contains the text of a field.
 @pytest.mark.parametrize(
     ("section", "quantity", "field"), _WRITTEN, ids=[" ".join(one[:2]) for one in _WRITTEN]
 )
@@ -228,7 +228,7 @@ _UNSEEN: dict[str, Callable[[mujoco.MjModel], object]] = {
     "sensor flag": lambda m: _set(m, "disableflags", mujoco.mjtDisableBit.mjDSBL_SENSOR),
     "bits of a geom that was compiled without": lambda m: m.geom_contype.__setitem__(10, 1),
 }
-# Written to a compiled model, these count after `mj_setConst`.
+# Written to a compiled model, these count only after `mj_setConst`.
 _CURABLE: dict[str, Callable[[mujoco.MjModel], object]] = {
     "surface velocity": lambda m: m.geom_surfacevel.__setitem__(0, 0.5),
     "adhesion": lambda m: m.geom_adhesion.__setitem__(0, 0.5),
@@ -314,7 +314,7 @@ _PID = """<mujoco>
         ),
     ],
 )
-def test_switches_and_what_is_rare_counts(
+def test_switches_and_rare_features_count(
     text: str, write: Callable[[mujoco.MjModel], object]
 ) -> None:
     nominal, written = (mujoco.MjModel.from_xml_string(text) for _ in range(2))
@@ -351,7 +351,7 @@ def test_the_last_bits_do_not_count(name: str, seed: int) -> None:
         values = getattr(model, array)
         if not isinstance(values, np.ndarray) or not values.size:
             continue
-        if values.dtype == np.float32:  # Computed in double precision, so few are another number.
+        if values.dtype == np.float32:  # Computed in double precision, so few of them change.
             values.flat[random.integers(values.size)] *= 1.0 + np.finfo(np.float32).eps
         elif values.dtype == np.float64:
             noise = random.uniform(-4e-16, 4e-16, values.shape)

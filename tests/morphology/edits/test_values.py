@@ -1,4 +1,4 @@
-"""Edits of one number, of joints, motors and freedom, and of places."""
+"""Edits of one number, of joints and motors, and of places."""
 
 from __future__ import annotations
 
@@ -308,7 +308,7 @@ def test_a_geom_is_placed_by_its_ends() -> None:
 
 
 @pytest.mark.parametrize("ends", [(0.1, 0.9), (0.9, 0.1)])
-def test_halfway_lies_between(ends: tuple[float, float]) -> None:
+def test_half_the_amount_moves_both_ends_halfway(ends: tuple[float, float]) -> None:
     """The ends of a geom given by its pose have no order: each goes to the nearer new one."""
     model = limb('<geom name="rod" type="capsule" size=".1 .2" pos="0 0 .3"/>')
     start, end = ((0.0, 0.0, height) for height in ends)
@@ -317,7 +317,7 @@ def test_halfway_lies_between(ends: tuple[float, float]) -> None:
     half = built(model, PlaceGeom("rod", start, end, amount=0.5))
     assert half.geom("rod").size[1] == pytest.approx(0.3)
     assert half.geom("rod").pos[2] == pytest.approx(0.4)
-    # The ends of a geom given by its ends have one.
+    # The ends of a geom given by its ends have an order.
     turned = built(leg(), PlaceGeom("thigh", (0.0, 0.0, -0.3), (0.0, 0.0, 0.1), amount=0.5))
     assert turned.geom("thigh").size[1] == pytest.approx(0.025)
 
@@ -349,7 +349,7 @@ def test_the_total_mass_is_set() -> None:
 
 
 def test_a_robot_lands_on_its_floor() -> None:
-    """The box of 0.2 m comes to rest 0.1 m above it."""
+    """The middle of the box of 0.2 m comes to rest 0.1 m above the floor."""
     body = (AddFreeJoint("base"), StartHeight("base", 0.7), AddFloor(friction=0.5, height=0.5))
     model = compile_body(spec_of(URDF), body)
     assert model.geom("floor").friction[0] == 0.5

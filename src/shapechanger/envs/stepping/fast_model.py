@@ -43,7 +43,7 @@ def find_fast_model(
 
     The model is unedited, and `make_spec` returns the spec from which it was compiled.
     """
-    # Other models may have constraints in several trees, or elements that the rules do not cover.
+    # Refused models may have constraints in several trees, or elements without a rule here.
     if (
         model.ntree != 1
         or model.opt.enableflags

@@ -37,8 +37,8 @@ class PausedClock:
     """Steps the physics while MuJoCo's profiling clock is paused, for all threads.
 
     A step of an ant reads the clock hundreds of times to fill `data.timer`, on which no other
-    number depends. `mujoco.set_mjcb_time(None)` installs the clock again, so the pointer to it is
-    set. A clock that a user installs is kept.
+    number depends. `mujoco.set_mjcb_time(None)` installs the clock again, so the pointer to the
+    clock is set to None directly. A clock that a user installs is kept.
     """
 
     def __init__(self, clock: ctypes.c_void_p) -> None:
@@ -120,7 +120,8 @@ class ModelWatch:
     def __init__(self, model: mujoco.MjModel) -> None:
         self.model = model
         self._options = model.opt
-        # These come first, wherever they are in memory, so that equal models have equal digests.
+        # Options and statistics come first, so that equal models have equal digests wherever they
+        # are in memory.
         views = [*_views(sys.maxsize, model.opt, model.stat), *_views(_APART, model)]
         # A bytearray compares itself with any buffer by memcmp; bytes would not.
         parts = [bytearray(view) for view in views]
@@ -303,11 +304,11 @@ class TunedStep(Reshapable):
                         shared.fast = find_fast_model(self.model, self.body_spec)
                         shared.searched = True
                 bound.step_with(shared.fast)
-        # Without a fast model the public model steps; only its timestep was copied.
+        # The public model itself steps; of its numbers, the binding has copied only the timestep.
         return bound if bound.dt == self.dt else None
 
     def _new_binding(self) -> Any:
-        """Return a new binding; None if the model or a method that it replaces was changed."""
+        """Return a new binding; None if the model or a method in `replaced` was changed."""
         self._require_reset("step")
         self._bound = None
         watch, mine = self._watch, type(self)
@@ -321,7 +322,7 @@ class TunedStep(Reshapable):
 
 
 def _views(apart: int, *owners: Any) -> list[Any]:
-    """Return views of the memory of all arrays; those closer than `apart` bytes share one."""
+    """Return views of the memory of all arrays; arrays closer than `apart` bytes share one."""
     arrays = [getattr(owner, name) for owner in owners for name in _array_names(owner.__class__)]
     # An array that owns its memory is a temporary copy.
     spans = [

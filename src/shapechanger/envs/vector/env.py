@@ -37,8 +37,8 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     checked before any env steps, and an env whose simulation diverges is terminated with
     `info["diverged"]` (see `SubEnv`).
 
-    If an env raises, the others finish the step; on Ctrl-C, the threads do. The envs are then no
-    longer at the same step, so the next call must be `reset` or `close`.
+    If an env raises, the others finish the step; on Ctrl-C, the threads finish it. The envs are
+    then no longer at the same step, so the next call must be `reset` or `close`.
 
     `shapechanger.make_vec` makes it.
 

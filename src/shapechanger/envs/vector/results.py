@@ -152,7 +152,7 @@ class SubEnv:
         """Start an episode, and return its info; see `gymnasium.Env.reset`."""
         self.row[...], info = self.env.reset(seed=seed, options=options)
         inner: Any = self.env.unwrapped
-        if hasattr(inner, "data"):  # A reset may have replaced it.
+        if hasattr(inner, "data"):  # A reset may have replaced `data`.
             self._warnings = inner.data.warning.number[_BAD_STATE]
         return info
 

@@ -51,8 +51,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     of the world and on how many episodes it has begun since then, and on nothing else. The body
     that a world draws from a pool depends on the same two numbers.
 
-    A step waits for the device once, to check that actions are finite, and copies nothing to it.
-    `shapechanger.make_vec` makes the env.
+    A step waits for the device once, to check that actions are finite, and copies nothing to it,
+    except for `FingerTrack`. `shapechanger.make_vec` makes the env.
 
     Args:
         reader: Compiles bodies.
@@ -66,7 +66,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
     Attributes:
         device: Name of the device.
-        batches: The worlds, by the shapes of their arrays.
+        batches: The worlds, grouped by the shapes of their arrays.
         made_from: The spec of the CPU env, or None.
         max_episode_steps: Steps after which an episode is truncated; None for never.
         episode_steps: Steps of each world's episode so far, shape (n,); it may be written.
@@ -255,7 +255,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         limit = self.max_episode_steps
         truncated = self.episode_steps >= (_NO_LIMIT if limit is None else limit)
         ended = terminated | truncated
-        # Ended episodes are not checked, because reading the result would synchronise the GPU.
+        # Called even if no episode has ended, because reading `ended` would synchronise the GPU.
         starts, start_infos = self._start(ended)
         infos: dict[str, Any] = {
             **{"final_obs": self._out(observations), "_final_obs": ended},
@@ -281,7 +281,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
                 limits = " and ".join(f"{name}={most}" for name, most in batch.limits.items())
                 warnings.warn(
                     f"{count} worlds had more contacts or constraints than {limits} have memory "
-                    "for, and their physics is wrong without the others: raise these numbers.",
+                    "for. Some were left out, so their physics is wrong: raise these numbers.",
                     stacklevel=3,
                 )
 

@@ -11,7 +11,7 @@ Two private functions of mujoco-warp 4.0 differ from MuJoCo or ignore differing 
   the capsule. mujoco-warp does so only if the capsule leans by more than 30 degrees from the
   plane's normal, and along the world's axes for steeper ones, which turns the pyramid by up to 45
   degrees: an ant's step with a steep shank on the floor then differs by a third in some velocities.
-  With elliptic cones, whose friction has no direction, both agree to 1e-5.
+  With elliptic cones, whose friction has no direction, the two simulators agree to 1e-5.
 - **Moment arms.** mujoco-warp keeps the arms of fixed tendons, `wrap_prm`, once for all worlds.
 
 Both are replaced only in the version that the replacements were written for; a test in
@@ -157,7 +157,7 @@ def _write_tendon(
     jacobian: wp.array2d[float],
     lengths: wp.array2d[float],
 ):
-    """Write the length of a tendon in a world, the sum of arms by angles, and its derivative."""
+    """Write a tendon's length in a world, the sum of arms times angles, and its derivative."""
     world, tendon = wp.tid()
     own = world * joints.shape[0]  # Offset of this world's arms.
     length = float(0.0)  # noqa: UP018  # Warp tells variables from constants by this.

@@ -21,13 +21,13 @@ from shapechanger.morphology import Body
 
 _Make = Callable[[dict[str, Any]], gym.Env[Any, Any]]
 MakeWorlds = Callable[..., Worlds]
-"""Makes `Worlds` from their numbers and the arguments after these."""
+"""Makes `Worlds` from the numbers of the worlds and the further arguments of the class."""
 
 
 class BodyReader:
     """Compiles bodies of a family with CPU envs, and reads their arrays for a device.
 
-    `make` makes a CPU env of the task from its arguments; `first` is one of them.
+    `make` makes a CPU env of the task from its arguments; `first` is such an env.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class BodyReader:
     ) -> None:
         self.spec = first.spec
         self._task, self._make, self._arguments = task, make, arguments
-        # One CPU env for each pair of spaces; it changes its body.
+        # One CPU env for each pair of spaces; its body is changed.
         self._envs: list[Any] = [first.unwrapped]
         self._usual: Body = self._envs[0].body
 

@@ -33,7 +33,7 @@ _ARRAYS: Final = (
 )
 # Parts of the state that a restart clears, in addition to the positions.
 _CLEARED: Final = ("act", "qacc_warmstart", "ctrl", "qvel", "cfrc_ext", "time")
-# Overflows of the memory for contacts and constraints, by which results are wrong.
+# Overflows of the memory for contacts and constraints, which make results wrong.
 _OVERFLOWS: Final = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
 # Largest number of contacts of two geoms of which one has the shape; "" for all other shapes.
 _MOST_CONTACTS: Final = {"SPHERE": 1, "CAPSULE": 2, "": 8}
@@ -93,7 +93,7 @@ def device_body(name: str, model: mujoco.MjModel, constants: Rows) -> DeviceBody
                 if is_row:
                     rows[key] = array
                 shared[key] = str(array.shape).encode() + (b"" if is_row else array.tobytes())
-    # The memory for constraints depends on which of these are zero, in a batch's first body.
+    # Which of these are zero in a batch's first body decides the memory for constraints.
     for key in ("dof_frictionloss", "tendon_frictionloss"):
         shared[f"zeros of {key}"] = (getattr(model, key) > 0.0).tobytes()
     data = mujoco.MjData(model)
@@ -255,7 +255,7 @@ class Worlds(ABC):
             )
 
     def change_bodies(self, bodies: Mapping[Any, DeviceBody], each: Sequence[Any]) -> None:
-        """Replace the bodies that worlds can have; worlds with another one must start again.
+        """Replace the bodies that worlds can have; worlds whose body changes must start again.
 
         The numbers of all bodies stay on the device, from which `_choose` gathers. A field of the
         model gets a row per world as soon as two bodies differ in it. Bodies are keyed by their
@@ -332,7 +332,7 @@ class Worlds(ABC):
     def start(self, mask: Tensor, seeds: Tensor, episodes: Tensor) -> tuple[Tensor, Infos]:
         """Start an episode in the worlds of a mask, shape (n,); other arguments as for `uniforms`.
 
-        Return observations, shape (n, size), and infos; only the rows of the mask are of the start.
+        Return observations, shape (n, size), and infos; only the rows of the mask show a start.
         """
         self._clear(mask)
         if self._redraws:

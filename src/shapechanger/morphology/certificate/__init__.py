@@ -231,7 +231,7 @@ def matched_commands(
 
 
 def _ranges(layout: Layout) -> list[_Range]:
-    """Return a finite range for each number; a missing bound becomes -1 or 1, or lies beyond."""
+    """Return a finite range for each number; a missing bound is -1 or 1, or 1 beyond the other."""
     low, high = layout.low, layout.high
     bottom = np.where(np.isfinite(low), low, np.minimum(-1.0, high - 1.0))
     top = np.where(np.isfinite(high), high, np.maximum(1.0, low + 1.0))
@@ -242,9 +242,9 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
     """Reset two environments with one seed, give them the same commands and compare the responses.
 
     A command is drawn per motor name, so a motor that both have gets the same number whatever
-    other motors there are; a motor that one lacks gets zero. The source runs first and the target
-    after it, so one object may be both. Each is left in the middle of an episode. The rollout stops
-    after fewer than `steps` steps if an episode ends.
+    other motors there are; a motor that only one of them has gets zero. The source runs first and
+    the target after it, so one object may be both. Each is left in the middle of an episode. The
+    rollout stops after fewer than `steps` steps if an episode ends.
     """
     commands = matched_commands(_layout(source, "action"), _layout(target, "action"), steps, seed)
     before, over = _drive(source, commands[0], seed)
@@ -277,7 +277,7 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
         sentences += [f"Rewards differ by up to {reward:.4g} a step."]
     if ended[0] != ended[1]:
         sentences += [f"Only the {'source' if ended[0] else 'target'} ended its episode."]
-    # Rounding explains neither a sudden difference nor another end without a difference before it.
+    # Rounding explains neither a sudden difference nor a different end that no difference precedes.
     largest_before = np.append(0.0, np.maximum.accumulate(excess)[:-1])
     sudden = bool(np.any((excess > 1.0) & (excess > _GROWTH * largest_before)))
     sudden |= ended[0] != ended[1] and bool(excess.max() <= 1.0)
@@ -291,9 +291,10 @@ def _layout(env: Any, side: str) -> Layout:
 
 
 def _gaps(before: _Floats, after: _Floats) -> tuple[_Floats, _Floats]:
-    """Return absolute differences, (n, numbers), and the largest of each step in tolerances, (n,).
+    """Return absolute differences, (n, numbers), and the largest per step in tolerances, (n,).
 
-    Of numbers that are not finite, and differ, it is the largest finite number.
+    If numbers differ and one is not finite, their difference is the largest finite
+    number.
     """
     same = (before == after) | (np.isnan(before) & np.isnan(after))
     with np.errstate(invalid="ignore"):
@@ -305,7 +306,7 @@ def _gaps(before: _Floats, after: _Floats) -> tuple[_Floats, _Floats]:
 
 
 def _drive(env: Any, commands: NDArray[np.float32], seed: int) -> tuple[_Floats, bool]:
-    """Return the rows of observation and reward, (steps + 1, size + 1), and whether it ended."""
+    """Return observations and rewards, (steps + 1, size + 1), and whether the episode ended."""
     observation, _ = env.reset(seed=seed)
     rows, ended = [np.append(_flat(observation), 0.0)], False
     for command in commands:

@@ -31,7 +31,7 @@ derives are less exact."""
 _NOISE: Final = 1e-14
 """Tolerance relative to the largest number of a field in the whole model: a computed zero, such as
 after turning a frame, is not exactly zero."""
-_ROUNDED_TO: Final = 10  # Digits of the largest number of a field: a half of `ROUNDING` at most.
+_ROUNDED_TO: Final = 10  # Digits of a field's largest number; the error is at most half `ROUNDING`.
 # 64 bits: the chance that two of a million different models collide is 1 in 37 million.
 _HEX_DIGITS: Final = 16
 
@@ -159,7 +159,7 @@ def compare(
 def _lengths(
     source: mujoco.MjModel, target: mujoco.MjModel, one: Numbers, two: Numbers
 ) -> tuple[list[_Row], set[str]]:
-    """Return lengths, without caps, and radii of round geoms in both models, and their names.
+    """Return lengths, without caps, and radii of round geoms in both models, and the geoms' names.
 
     A geom that touches nothing is reported only if its body differs. The only geom of a body is
     reported under the body's name.

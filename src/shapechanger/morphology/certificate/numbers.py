@@ -198,7 +198,7 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
 
 
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> NDArray[np.bool_]:
-    """Return whether MuJoCo can collide the two shapes, and one of the two can move."""
+    """Return for each pair whether MuJoCo can collide its two geoms and one of them can move."""
     moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
     flat = np.isin(model.geom_type[pairs], _FLAT)
     return np.logical_and(~np.all(flat, axis=1), np.any(moving, axis=1))
@@ -390,7 +390,7 @@ class _Reader:
                 if field.of and not field.of.startswith("mjt"):
                     acts = self.array(field.where) if field.where else None
                     for i, (kind, index) in enumerate(self._indices(field)):
-                        if acts is None or acts[i]:  # The second number may be no site.
+                        if acts is None or acts[i]:  # An actuator's second target may be no site.
                             used[kind].add(index)
         geoms, sites, bodies = (
             np.isin(np.arange(len(self.names[kind])), list(used[kind]))

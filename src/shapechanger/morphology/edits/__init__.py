@@ -24,8 +24,8 @@ from shapechanger.morphology.spec.carried import Keyframes
 _N = TypeVar("_N", float, np.ndarray)
 
 Vector = tuple[float, float, float]
-# A limb a hundred times longer or shorter is a typing mistake, and the softness of MuJoCo's
-# contacts, which is absolute, does not fit it.
+# A limb more than a hundred times longer or shorter is a typing mistake, and the softness of
+# MuJoCo's contacts, which is absolute, does not fit its size.
 Ratio = Annotated[float, msgspec.Meta(ge=0.01, le=100.0)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 

@@ -291,7 +291,7 @@ class Split(Edit, frozen=True):
         share_contacts(spec, body, part, halves)
 
     def _divide(self, geom: Any, copy: Any, piece: geometry.NearPart, place: np.ndarray) -> None:
-        """Divide a geom: it becomes the nearer half, a copy on the other body the farther one."""
+        """Divide a geom: it becomes the nearer half, and `copy` the farther half."""
         whole = geometry.volume(geom)
         # Scale the copy about its near end, and then move that end to the cut.
         geometry.move_by(copy, -piece.near)
@@ -442,7 +442,7 @@ def _scale_resistance(element: Any, factor: float) -> None:
 def _add_segment(
     spec: mujoco.MjSpec, body: Any, edit: Split | AddSegment, place: np.ndarray, amount: float
 ) -> mujoco.MjsBody:
-    """Add a body without geoms at `place` of `body`, on a hinge like its own, with its motor."""
+    """Add a body without geoms at `place` of `body`, on a new hinge, with its motor."""
     for kind in ("body", "joint", "actuator"):
         require_free_name(spec, kind, edit.name)
     own = next((j for j in body.joints if j.type == _J.mjJNT_HINGE), None)

@@ -169,7 +169,7 @@ class PlaceBody(Edit, frozen=True):
             body.pos = self._placed(body.pos)
 
     def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
-        """Place the bodies that float in every keyframe too."""
+        """Move bodies with a free joint in every keyframe too."""
         for body in select("body", self.body, spec.bodies[1:]):
             for joint in (j for j in body.joints if j.type == _J.mjJNT_FREE):
                 keyframes.change(joint.name, self._placed)

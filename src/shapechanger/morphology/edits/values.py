@@ -252,7 +252,7 @@ class Friction(ValueEdit, frozen=True):
 class JointRange(Edit, frozen=True):
     """Change how far hinges and slides move; a joint without limits becomes limited.
 
-    A slide without limits needs both limits. At a smaller amount, they are farther apart.
+    A slide without limits needs both limits. At an amount below 1, they are farther apart.
 
     Attributes:
         joint: Name or glob of the joints.

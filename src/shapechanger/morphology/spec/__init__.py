@@ -42,12 +42,12 @@ from shapechanger.morphology.spec.references import (
 )
 
 LEAST_MASS: Final = 1e-14
-"""Ten times the mass and the inertia of a body that MuJoCo refuses, kg and kg·m²."""
+"""Ten times the limit of mass and inertia, kg and kg·m², below which MuJoCo refuses a body."""
 
 _O: Final = mujoco.mjtObj
 _W: Final = mujoco.mjtWrap
 _OLD: Final = "~old"  # Suffix of temporary names, while another element still has the name.
-# Not copied: names are unique, and orientations are written in units that belong to each element.
+# Not copied: names must be unique, and orientations are in the units of each element.
 _APART: Final = ("name", "alt", "ialt", "quat", "iquat", "classname", "childclass", "info")
 
 _N = TypeVar("_N", bound=Any)
@@ -192,7 +192,7 @@ def _write_out_bounds(spec: mujoco.MjSpec) -> None:
 
 
 def resolve_frames(spec: mujoco.MjSpec) -> None:
-    """Express every pose relative to its body, and reset the frames; refuse those that scale."""
+    """Express every pose relative to its body, and reset the frames; refuse frames that scale."""
     for frame in spec.frames:
         if np.any(frame.scale != 1.0) or frame.massscale:
             raise MorphologyError(
@@ -216,7 +216,7 @@ def resolve_frames(spec: mujoco.MjSpec) -> None:
 
 def _resolve(element: Any, turn: np.ndarray, shift: np.ndarray) -> None:
     if has_ends(element) and element.type == mujoco.mjtGeom.mjGEOM_BOX:
-        # The turn of a box about its axis follows from the frame: write its pose, as MuJoCo does.
+        # The ends of a box do not give its turn about its axis: write its pose, as MuJoCo does.
         first, last = points_of(element)
         length, upwards = float(np.linalg.norm(first - last)), np.empty(4)
         mujoco.mju_quatZ2Vec(upwards, (first - last) / length)
@@ -344,7 +344,7 @@ def copy_limb(
     holders = (*spec.tendons, *spec.equalities, *spec.excludes, *spec.pairs)
     for holder in cast("list[Any]", [*holders, *spec.actuators, *spec.sensors]):
         own = [mention for mention in named if mention.holder == holder]
-        # An actuator with only its other end on the limb moves another limb.
+        # An actuator with only its `refsite` on the limb moves another limb.
         moves = (m for m in own if m.kind != "actuator" or m.field != "refsite")
         if not any(mention.element in inside for mention in moves):
             continue

@@ -1,9 +1,9 @@
 """Data that refer to positions or order: keyframes, pins of loops, paths of tendons.
 
-While edits are applied, keyframes are removed and each pin is replaced by two sites. MuJoCo states
-a pin in the frame of its first body, and derives its place on the second body from the model's own
-pose. After the edits, that pose is changed until every loop that was closed in it is closed again.
-Then pins and keyframes are written back.
+While edits are applied, keyframes are removed, and each pin (a `connect` or `weld`) is replaced by
+two sites. MuJoCo states a pin in the frame of its first body, and derives its place on the second
+body from the model's own pose. After the edits, that pose is changed until every loop that was
+closed in it is closed again. Then pins and keyframes are written back.
 """
 
 from __future__ import annotations

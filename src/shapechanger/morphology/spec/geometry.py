@@ -42,7 +42,7 @@ def rotation(quaternion: Array) -> Array:
 
 
 def product(first: Array, second: Array) -> Array:
-    """Return the quaternion of a second turn, made in the frame that the first has turned."""
+    """Return the quaternion of a first turn and then a second one in the turned frame."""
     mujoco.mju_mulQuat(result := np.empty(4), first, second)
     return result
 
@@ -349,7 +349,7 @@ class Plane:
         return self._share(middle_of(point)) > 1.0 - _SAME
 
     def piece_of(self, geom: mujoco.MjsGeom) -> NearPart:
-        """Return the part of a geom on the near side; a geom without a length has its middle's."""
+        """Return the part of a geom on the near side, by its middle if it has no length."""
         ends, axis = self._ends(geom)
         if not len(ends):
             middle = middle_of(geom)
