@@ -136,7 +136,7 @@ def test_packages_of_a_urdf_are_folders_around_it(tmp_path: Path, scheme: str) -
         file = _written(folder, "link.urdf", text)
         assert compile_body(own_family(file).load(file)).nmesh == 1
     (tmp_path / "parts" / "wedge.obj").unlink()
-    with pytest.raises(BrokenModel, match=r"neither a folder 'parts' that it is in"):
+    with pytest.raises(BrokenModel, match=r"is in no folder 'parts' that contains link\.urdf"):
         own_family(file).load(file)
 
 

@@ -139,9 +139,9 @@ def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
         found = next((folder / rest for folder in folders if (folder / rest).is_file()), None)
         if found is None:
             raise BrokenModel(
-                f"{path.name} names the file {element.file}, and neither a folder {name!r} that it "
-                f"is in nor one next to these has {rest}: copy the package's folder next to "
-                f"{path.name}, or write a path relative to it."
+                f"{path.name} names the file {element.file}, and {rest} is in no folder {name!r} "
+                f"that contains {path.name} or lies next to a folder that contains it: copy the "
+                f"package's folder next to {path.name}, or write a path relative to it."
             )
         element.file = str(found)
 

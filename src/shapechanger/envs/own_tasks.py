@@ -80,7 +80,7 @@ class RobotState:
 
 
 class OwnTask(Protocol):
-    """A task; it may also have the attributes below.
+    """A task. It must have `reward`, and may have the attributes below.
 
     - `observe`: names or globs of the numbers to observe, such as `("*/angle", "*/contact/*")`; by
       default all positions and velocities, except the position on the floor.

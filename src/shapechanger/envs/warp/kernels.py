@@ -160,7 +160,7 @@ def _write_tendon(
     """Write a tendon's length in a world, the sum of arms times angles, and its derivative."""
     world, tendon = wp.tid()
     own = world * joints.shape[0]  # Offset of this world's arms.
-    length = float(0.0)  # noqa: UP018  # Warp tells variables from constants by this.
+    length = float(0.0)  # noqa: UP018  # Warp recognises variables by this call.
     for i in range(first[tendon], first[tendon] + count[tendon]):
         length += arms[own + i] * angles[world, angle_of[joints[i]]]
     lengths[world, tendon] = length

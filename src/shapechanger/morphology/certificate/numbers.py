@@ -198,7 +198,7 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
 
 
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> NDArray[np.bool_]:
-    """Return for each pair whether MuJoCo can collide its two geoms and one of them can move."""
+    """Return whether MuJoCo can collide the geoms of each pair, and one of them can move."""
     moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
     flat = np.isin(model.geom_type[pairs], _FLAT)
     return np.logical_and(~np.all(flat, axis=1), np.any(moving, axis=1))

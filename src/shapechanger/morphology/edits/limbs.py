@@ -163,8 +163,9 @@ class AddFreeJoint(Edit, frozen=True):
 class Cut(Edit, frozen=True):
     """Cut a limb: shorten a segment, and remove what is attached to it beyond the cut.
 
-    The nearer part is unchanged, and geoms that the cut crosses become shorter. Sites, pins of
-    loops, cameras and lights at or beyond the far end of the segment move to the new end.
+    The nearer part is unchanged, and geoms that the cut crosses become shorter. Sites, places of
+    `connect` and `weld`, cameras and lights at or beyond the far end of the segment move to the new
+    end.
 
     Attributes:
         body: Name or glob of the segments; not a trunk.

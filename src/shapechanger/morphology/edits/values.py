@@ -278,7 +278,7 @@ class JointRange(Edit, frozen=True):
             if (old := geometry.limits(joint)) is None:
                 if self.lower is None or self.upper is None:
                     raise MorphologyError(f"{joint.name!r} is a slide without limits: give both.")
-                # The smaller the amount, the wider.
+                # The smaller the amount, the wider the range.
                 reach = (self.upper - self.lower) / self.amount
                 old = self.lower - reach, self.upper + reach
             lower, upper = (
