@@ -193,7 +193,7 @@ def pages() -> list[Row]:
 
 
 def _first_reaching(run: RunResult, level: float) -> float | None:
-    """Return the seconds until a run first evaluates at `level`; None if it never does."""
+    """Return the seconds until an evaluation of a run reaches `level`; None if none does."""
     for evaluation in run.curve:
         if evaluation.mean_return >= level:
             return run.wall_s * evaluation.steps / run.curve[-1].steps

@@ -11,7 +11,7 @@ optimistic. They were chosen by accuracy, with one to three seeds each:
 
 - Inputs, with kernel ridge regression instead of a network: pixels (grey or coloured, 8 to 32
   rows), histograms of edges, and the features of the shipped clones of car and tank. Edges were
-  best for all cells and directions tried (9 variants): 0.73 to 0.78, against at most 0.70 for
+  best for all numbers of cells and directions (9 variants): 0.73 to 0.78, against at most 0.70 for
   pixels and 0.72 for the clones' features.
 - Mirroring half of the images: 0.72 instead of 0.76, because this drive turns left only. The
   clone therefore mirrors in proportion to how far its driver steered to both sides.
@@ -273,9 +273,9 @@ def rows(ours: NDArray[np.float64], theirs: NDArray[np.float64], straight: float
 def held_out() -> list[Row]:
     """Compare ways to use the last fifth of the frames before each test segment.
 
-    `demos train` never trains or stops by the steps of `--held-out`, so its two ways differ in the
-    frames alone. A third way learns from all and never stops; in a fourth the fifth decides when to
-    stop, and nothing else.
+    `demos train` uses the steps of `--held-out` neither for training nor for early stopping, so the
+    first two ways differ only in the frames. The third way learns from all frames without early
+    stopping. In the fourth way, the last fifth of the frames only decides when to stop.
     """
     frames = os.environ.get("REAL_FRAMES")
     if frames is None:

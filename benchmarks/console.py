@@ -87,7 +87,7 @@ def console(seconds: float = SECONDS) -> list[Row]:
         with _page(browser, robot) as page:
             page.evaluate(_HANG)
             stalled = _commands_ms(robot, seconds / 2)
-        # On this machine any browser page takes CPU time from the robot. This is the control.
+        # For comparison: a page without a connection also takes CPU time from the robot.
         with browser.new_context() as context:
             context.new_page().evaluate(_HANG)
             stranger = _commands_ms(robot, seconds / 2)
@@ -179,13 +179,13 @@ def _ages_ms(browser: Browser, robot: RunningRobot, seconds: float) -> tuple[lis
 
 
 def _crc_matches(bits: str) -> bool:
-    """Return whether the CRC of a time code matches like `read_barcode`."""
+    """Return whether the CRC of a time code matches, as `read_barcode` checks it."""
     data = int(bits, 2).to_bytes(8, "big")
     return binascii.crc_hqx(data[:6], 0xFFFF) == int.from_bytes(data[6:], "big")
 
 
 def _commands_ms(robot: RunningRobot, seconds: float) -> list[float]:
-    """Return the times between a client's commands at the outputs, by the robot's clock."""
+    """Return the times between a client's commands at the outputs, ms, by the robot's clock."""
     applied: list[int] = []
     with robot.client(name="program", frames=True) as client, robot.operator() as operator:
         operator.place(0)

@@ -28,7 +28,7 @@ from shapechanger.vehicles.envs import VehicleEnv
 
 LAYOUTS: Final = 100
 MINUTES: Final = 10
-# A clone of ten minutes rarely collides, so comparing two of them takes long drives.
+# A clone of ten minutes of driving rarely collides, so a comparison takes long drives.
 LONG_LAYOUTS: Final = 300
 FEW_MINUTES: Final = 2
 FEW_SEEDS: Final = 3
@@ -170,7 +170,7 @@ def _row(
 def _ratio_row(name: str, before: DriveScore, after: DriveScore, *, asked: bool = True) -> Row:
     """Return the ratio of two collision rates with its interval.
 
-    Given the sum of both counts, the second is binomial: J. Przyborowski and
+    Given the sum of both counts, the second count is binomial: J. Przyborowski and
     H. Wilenski, "Homogeneity of results in testing samples from Poisson series", Biometrika 1940.
     """
     together = before.collisions + after.collisions

@@ -51,13 +51,13 @@ FOLLOW_STEPS: Final = 6144
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 # Zero-shot success below this counts as a gap.
 _MILD: Final = 0.5
-# Required success: on a rig's twin, in process, and after twenty minutes of fine-tuning.
+# Required success: of `identified` on a rig's twin and in process, and of `fine-tune` on both.
 _RECOVERED: Final = 0.8
 _RECOVERED_IN_GAP: Final = 0.9
 _TUNED: Final = 0.7
 # A mean over fingers hides weak ones, so each row also counts the fingers with at least this share.
 _STRONG: Final = 0.8
-_FOLLOWED: Final = 2.0
+_FOLLOWED: Final = 2.0  # Largest error on a rig's twin, in errors in process.
 # Time that the whole command may take for a finger, min.
 _LIMIT_MIN: Final = 30.0
 # Distance within which a target counts as reached, m; `Finger-v1` has the same.
@@ -80,7 +80,7 @@ def gap() -> list[Row]:
     """Measure each arm's success on fingers of the gap "real-like", and the causes of the gap.
 
     The shipped policy in the nominal finger with a delay shows the cost of a delay alone. A policy
-    of the nominal finger with a rig's motors shows the cost of other moment arms and joints.
+    trained in the nominal finger with a rig's motors shows the cost of other arms and joints.
     `ONLY` names arms besides scratch and zero-shot, or "rig" for that policy. With `ENDED=1` no run
     is started, and the rows cover the runs that have ended.
     """
@@ -204,7 +204,8 @@ def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
 def _row(name: str, shares: Mapping[int, float]) -> Row:
     """Return a row of the shares of reached targets, keyed by the seed of the finger.
 
-    A row of some fingers names their seeds, so that it does not replace the row of the first ones.
+    If the seeds are not 0, 1, 2 and so on, the row's name contains them. A row with another name
+    does not replace an earlier row in the results.
     """
     values = np.array([*shares.values()])
     seeds = [*shares]
@@ -247,7 +248,7 @@ def _chatter_rows(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
 
 
 def rig() -> list[Row]:
-    """Measure what `gap` does through link, daemon, guard and servo bus; variables as in `gap`."""
+    """Repeat `gap` on twins of a rig, without its limits of reach; `ONLY` and `ENDED` as there."""
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
     out = Path("results", "finger-rig")
     plan, runs = _arms(target, out, RIGS, RIG_SIMULATED)
@@ -291,8 +292,8 @@ def follow() -> list[Row]:
     """Measure how closely policies that never saw a circle follow one on twins of a rig.
 
     Each policy learns other paths in the finger that was identified on its rig. The reference is
-    the same policy on the circle in that simulated finger, because a finger that is drawn from the
-    gap has other motors and delays than the rig's servos.
+    the same policy on the circle in that simulated finger, because fingers of the gap have other
+    motors and delays than the rig's servos.
     """
     source = EnvRef("shapechanger/FingerTrack-v1", {"path": "random"})
     circle = {"path": CIRCLE}

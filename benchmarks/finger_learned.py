@@ -58,7 +58,7 @@ TASKS: Final = {
     "reach": Task(EnvRef("shapechanger/Finger-v1"), "ppo-finger", 307_200),
     # Trained on random paths, so that the policy generalises to others.
     "track": Task(EnvRef("shapechanger/FingerTrack-v1", {"path": "random"}), "ppo-finger", 307_200),
-    # Knows the rig's motors, delay and noise, but no other finger than the nominal one.
+    # Trained with a rig's motors, delay and noise, but only in the nominal finger.
     "rig": Task(
         EnvRef(
             "shapechanger/Finger-v1",

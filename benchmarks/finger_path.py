@@ -29,14 +29,14 @@ _EPISODES = 5
 _FIRST_SEED = 3_000_000
 # The first steps are left out, so that the replay starts in motion.
 _BEGINS = 10
-# Lag of the motors that is found if no path is assumed.
+# Lag of the motors that identification finds if it assumes no command path, s.
 _LAG_S = 0.002
 
 
 def path() -> list[Row]:
     """Identify twins of a rig, and replay commands of the shipped policy in the identified fingers.
 
-    The policy was trained without a path, and chatters.
+    The policy was trained without a command path, and its commands chatter.
     """
     many = int(os.environ.get("FINGERS", "3"))
     delays: list[float] = []

@@ -1,4 +1,4 @@
-"""Targets that the fingers of a gap can hold, by statics and by a controller with their model."""
+"""Targets that fingers of a gap can hold, by statics and by a controller with a model of each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _GAIN: Final = 12.0
 # Units in which the solver's numbers are near 1: errors of 1 cm, tensions of 10 N, torques of
 # 10 mN·m.
 _ERROR_M, _TENSION_N, _TORQUE_NM = 0.01, 10.0, 0.01
-# Largest torque that an equilibrium may lack, N·m: a thousandth of the torque of the finger's
+# Largest unbalanced torque at an equilibrium, N·m: a thousandth of the torque of the finger's
 # weight.
 _BALANCED_NM: Final = 1e-5
 # Searches for an equilibrium, and the spread of their starts, rad.
@@ -80,7 +80,7 @@ class Statics:
         self._high = np.array(parameters.most_tension)
 
     def distance(self, target: NDArray[np.float64]) -> float:
-        """Return the distance of the nearest equilibrium without friction, m.
+        """Return the distance from a target to the nearest equilibrium without friction, m.
 
         Args:
             target: Position of the fingertip, m, (3,).
@@ -88,7 +88,7 @@ class Statics:
         return self._nearest(target, self._low, self._high)[0]
 
     def distance_coming_from_rest(self, target: NDArray[np.float64]) -> float:
-        """Return the distance of the nearest point at which a motion from the rest posture ends, m.
+        """Return the distance to the nearest point at which a motion from the rest posture ends, m.
 
         Friction reduces the pull of a shortening tendon, and increases the pull of a lengthening
         one.
@@ -108,7 +108,7 @@ class Statics:
         least: NDArray[np.float64],
         most: NDArray[np.float64],
     ) -> tuple[float, NDArray[np.float64]]:
-        """Return the distance of the nearest equilibrium, m, and its angles, rad, (4,)."""
+        """Return the distance to the nearest equilibrium, m, and its angles, rad, (4,)."""
         rng = np.random.default_rng(0)
         low, high = JOINT_RANGE.T
         least = np.maximum(least, 0.0)

@@ -62,7 +62,7 @@ GENERALIST_FILE: Final = Path("benchmarks", "results", "generalist-gpu.safetenso
 # training may use.
 ASIDE_S: Final = 40
 CAREFUL: Final = 0.93
-# Rounds and targets of the ratios.
+# Rounds of each ratio, and targets: of two ratios, and of the seconds to make many envs.
 ROUNDS: Final = 15
 DEAREST: Final = 1.1
 CAPTURED: Final = 3.0
@@ -140,7 +140,7 @@ def actions(envs: Any, steps: int, seed: int = 0) -> list[Any]:
 
 
 def _seconds(work: Callable[[], object], repeats: int) -> float:
-    """Return the wall-clock time of one of several calls."""
+    """Return the mean wall-clock time of a call, s."""
     _wait()
     began = time.perf_counter()
     for _ in range(repeats):

@@ -28,7 +28,7 @@ _BLOCK: Final = 256
 def launched() -> set[tuple[Any, int]]:
     """Return the modules and block sizes of the kernels that the trial launches.
 
-    The trial runs with few worlds on Warp's CPU device, with the launches of a GPU.
+    The trial runs with few worlds on Warp's CPU device, which launches the same kernels.
     """
     found: set[tuple[Any, int]] = set()
     launch, launch_tiled = wp.launch, wp.launch_tiled

@@ -39,7 +39,7 @@ class Measured(NamedTuple):
     """Result of one method over all studies of a case.
 
     Attributes:
-        coverage: Share of the intervals that contain the true value; missing intervals count too.
+        coverage: Share of intervals that contain the true value; a missing interval counts as one.
         width: Median width; a missing interval has infinite width.
     """
 

@@ -1,8 +1,9 @@
 """Train reference policies of each env from scratch, and measure its floor: scores without skill.
 
-Policies and curves are kept in `results/references`; finished trainings are not repeated and always
-count, as do the sources of the suite of ants. `ONLY` names envs, and `SEEDS` limits the number of
-trainings of each. The values and the best policy of each env are written into the package.
+Policies and curves are kept in `results/references`, and finished trainings are not repeated. A
+source policy of the suite of ants with the same budget is copied instead of trained. `ONLY` names
+envs, and `SEEDS` limits the trainings of each; finished trainings beyond that limit still count.
+The values and the best policy of each env are written into the package.
 """
 
 from __future__ import annotations

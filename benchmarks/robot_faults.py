@@ -66,7 +66,7 @@ def _hyphened(name: str) -> str:
 def _tried(
     profile: Path, name: str, one_shot: bool, trials: int, folder: Path
 ) -> list[TrialResult]:
-    """Run trials until enough of them drove, and return all."""
+    """Run trials until the robot drove in enough of them, and return all trials."""
     fault = FAULTS[name]
     path = folder / f"{fault.name}{'' if one_shot else ', no one-shot'}.jsonl".replace(" ", "-")
     lines = path.read_text().splitlines() if path.exists() else []
@@ -125,6 +125,6 @@ def _digest() -> str:
     whole.update(CAR.encode())
     for part in (root / name for name in _CODE):
         paths = sorted(part.rglob("*.py")) or [part]
-        for path in paths:  # A part that is gone is an error.
+        for path in paths:  # Reading a missing part raises an error.
             whole.update(path.read_bytes())
     return whole.hexdigest()[:12]

@@ -192,7 +192,7 @@ def _driven_on_board(vehicle: str, file: Path, course: int) -> tuple[DriveResult
             where = operator.where()
     came, took_s = where.truth["progress_m"], (where.t - began_ns) / 1e9
     result = DriveResult(course, came, took_s, int(where.truth["collisions"]), came >= METRES)
-    # The observer misses some commands, so only neighbours count.
+    # The person's client misses some commands, so only consecutive numbers count.
     return result, [(at - seen_at[n - 1]) / 1e6 for n, at in seen_at.items() if n - 1 in seen_at]
 
 

@@ -89,12 +89,12 @@ BY_STEERING: Final = {
     "car-by-its-steering": Source("car", labels="steering"),
     "car-by-the-path": Source("car", labels="path nearby"),
 }
-# Keys of a profile's camera. The car's own looks level and sees 48.8 degrees, in 160 x 120 pixels.
+# Keys of a profile's camera. The lab-car's looks level and sees 48.8 degrees, in 160 x 120 pixels.
 CAMERAS: Final[dict[str, dict[str, Any]]] = {
     "70 degrees, 8 down": {"pitch_deg": 8.0, "fovy_deg": 70.0},
     "module 3, 2 down": {"pitch_deg": 2.0, "fovy_deg": 41.0, "size": [160, 90]},
 }
-# Both clones were trained in the corridor.
+# Shipped clones, which were trained in the corridor, and the vehicles that they drive.
 STEERED: Final = (("car", "tank"), ("tank", "car"))
 STEERED_COURSES: Final = COURSES[:6]
 # Limit of collisions per 100 m, and number of the six pairs that should stay below it.
@@ -155,7 +155,7 @@ def worlds() -> list[Row]:
 def labels() -> list[Row]:
     """Compare clones of a driver's own steering with clones of the path, on equal images.
 
-    The driver is the expert at the whole robot of a car, by steering and throttle.
+    The driver is the expert, which drives the whole robot of a car by steering and throttle.
     """
     OUT.mkdir(parents=True, exist_ok=True)
     use_one_thread()

@@ -115,7 +115,7 @@ def _finger() -> list[Panel]:
 # Azimuth of the camera around a vehicle; at 0 it is behind the vehicle.
 _BESIDE: Final = math.radians(30.0)
 _INDOORS: Final = ("corridor", FLOODED)
-# Gamma of the view from outside in a world that only lamps light.
+# Gamma of the view from outside in a world that is lit only by lamps.
 _DARK: Final = 0.7
 _COURSE: Final = 5
 

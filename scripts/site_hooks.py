@@ -150,7 +150,7 @@ def _keys(kinds: Iterable[type], options: Mapping[str, Iterable[str]]) -> str:
                 names = tuple(options.get(name, ()))
                 values = permitted(inspect.LiteralType(names) if names else field.type)
                 values = values.replace(Pin.description, "a pin").replace("'", '"')
-                # A default of None is no key at all.
+                # A profile cannot contain None, so the table does not explain it.
                 meaning = re.sub(r"; None [^.;]*", "", meanings.get(name, ""))
                 rows.append((f"`{name}`", values, _default(name, field), meaning))
     return table(_HEAD, rows) if rows else ""

@@ -1,4 +1,4 @@
-"""Configurations of both devices, which LeRobot fills from its command line.
+"""Configurations of the robot and of its console, which LeRobot fills from its command line.
 
 They do not contain the robot's key, because LeRobot logs and saves configurations: `id` is the name
 under which `shapechanger robot remember` stored the robot and its key.
