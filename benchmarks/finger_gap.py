@@ -248,7 +248,7 @@ def _chatter_rows(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
 
 
 def rig() -> list[Row]:
-    """Repeat `gap` on twins of a rig, without its limits of reach; `ONLY` and `ENDED` as there."""
+    """Measure the arms of `gap` on twins of a rig; `ONLY` and `ENDED` mean the same as in `gap`."""
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
     out = Path("results", "finger-rig")
     plan, runs = _arms(target, out, RIGS, RIG_SIMULATED)

@@ -106,8 +106,8 @@ _MINUTE_S: Final = 60.0
 def outlook(card: PolicyCard) -> str:
     """Return sentences on the collisions to expect of a cloned driver, and on the next step.
 
-    Both texts are "" if the policy does not steer by images, or its card has no `learned_s`. The
-    rates were measured with a car in corridors.
+    Return "" if the policy does not steer by images, or its card has no `learned_s`. The rates were
+    measured with a car in corridors.
     """
     learned_s = card.data.get("learned_s", 0.0)
     names = () if card.action is None else card.action.names

@@ -43,7 +43,7 @@ class Dataset:
         state_layout: Meaning of the values of a state; None without states.
         control_hz: Steps per second.
         body: Kind of robot of the first episode, such as "car"; "" if unknown.
-        rate_jitter: How far the rate varied, as a share of it; see `statistics.rate_jitter`.
+        rate_jitter: How far the rate varied, as a share of it; see `episodes.records.rate_jitter`.
     """
 
     pictures: NDArray[np.uint8] | None

@@ -54,8 +54,9 @@ class Pilot:
     corrects a policy, the expert makes no mistakes.
 
     A slow policy is not corrected: any throttle from rest to the expert's counts as agreement.
-    Dangers are detected in the `world` of the env, if it has one. A corrected policy and its expert
-    made `steps` decisions, the expert `corrected` of them in `takeovers` stretches.
+    Dangers are detected in the `world` of the env, if it has one. While a
+    policy may be corrected, `steps` counts all decisions, `corrected` the decisions of the expert,
+    and `takeovers` how often the expert took over.
     """
 
     def __init__(

@@ -207,7 +207,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         """
         if self._header is None:
             raise gym.error.ResetNeeded("Call reset() before the first step of an episode.")
-        writer, self._writer = self._writer, None  # In case the next one cannot be created.
+        writer, self._writer = self._writer, None  # Stays None if the next one fails.
         if writer is None:  # Check the folder before the env moves.
             writer = EpisodeWriter.create(self._recording, self._header)
         elif writer.is_full:

@@ -44,7 +44,7 @@ def clone_card(
     data: dict[str, Any] | None = None,
     **net: Any,
 ) -> PolicyCard:
-    """Return the card of a small clone, with other values of its network."""
+    """Return the card of a small clone; `net` changes fields of its network."""
     small = {"framing": Framing(height=24, width=32), "channels": (4, 6), "features": 8}
     clone = CloneNetwork(**{**small, **net})
     return PolicyCard(
@@ -55,7 +55,8 @@ def clone_card(
 def stripes(n: int, seed: int, layout: Layout = KEYS) -> Dataset:
     """Return dark noise with a stripe on the left, in the middle or on the right.
 
-    The side sets the steering. The first state feature holds it too; the last equals the action.
+    The side, -1, 0 or 1, sets the steering. The first value of the state is twice the side, and the
+    last equals the first value of the action.
     """
     rng = np.random.default_rng(seed)
     side = rng.integers(-1, 2, n)

@@ -74,7 +74,7 @@ def test_files_have_the_same_card_and_actions(kind: str, tmp_path: Path) -> None
         single = one.predict(*(None if part is None else part[0] for part in both.values()))
         np.testing.assert_allclose(single, acted[0], atol=1e-6)
     np.testing.assert_allclose(onnx.act(seen), acted, atol=1e-5)
-    shutil.copy(saved, exported)  # A change of the file changes nothing.
+    shutil.copy(saved, exported)  # A loaded policy does not read its file again.
     np.testing.assert_allclose(onnx.act(seen), acted, atol=1e-5)
 
 

@@ -136,7 +136,7 @@ _TIMES_S = st.lists(st.floats(0.0, 3.0), min_size=1, max_size=12).map(sorted)
     has_clock=st.booleans(),
     bad_s=st.sampled_from([-0.0, -1e-300, math.nan, math.inf]),
 )
-def test_undo_excludes_what_is_later(
+def test_undo_excludes_the_newest_seconds(
     *,
     times_s: list[float],
     began_ns: int,

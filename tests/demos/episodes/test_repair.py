@@ -53,7 +53,7 @@ def test_cut_off_at_any_byte(share: float, tmp_path_factory: pytest.TempPathFact
 
 @settings(max_examples=40)
 @given(place=st.integers(0, 10_000), bit=st.integers(0, 7))
-def test_one_flipped_bit_costs_one_step(
+def test_one_flipped_bit_costs_at_most_two_steps(
     place: int, bit: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     path = recorded(tmp_path_factory.mktemp("recording"))
@@ -68,7 +68,7 @@ def test_one_flipped_bit_costs_one_step(
 
 
 def test_repairing_an_intact_episode_changes_nothing(tmp_path: Path) -> None:
-    """Marks and edits are lines, and not steps."""
+    """Lines that are not steps, such as marks and edits, are not damage."""
     path = recorded(tmp_path)
     edit(path, EpisodeMark(1, "a door"))
     edit(path, Drop(2, 3, "bad"))
@@ -138,7 +138,7 @@ def test_episodes_are_merged_unchanged(tmp_path: Path) -> None:
             for path in (source, target)
         )
         assert files == copies
-    # An episode is recognized after its steps were judged; nothing is copied then.
+    # Excluded steps do not make an episode a new one. If one is refused, none is copied.
     edit(one, Drop(0, 1, "bad"))
     recorded(tmp_path / "c")
     with pytest.raises(DemosError, match="the same episode"):
@@ -165,7 +165,7 @@ def test_what_cannot_be_merged_is_refused(tmp_path: Path) -> None:
         merge([whole], tmp_path / "all")
 
 
-def test_episodes_of_the_same_time_differ_in_their_first_step(tmp_path: Path) -> None:
+def test_episodes_without_a_start_time_are_told_apart_by_their_steps(tmp_path: Path) -> None:
     steps = [[], [step()], [step(action=(0.5, 0.2))]]
     for number, added in enumerate(steps):
         folder = tmp_path / str(number)

@@ -78,7 +78,7 @@ def test_no_lost_picture_shifts_the_others(
 
 
 def place(number: int, **changes: Any) -> Any:
-    """Return a change of an episode's row in `meta/episodes`; keys without "/" are the video's."""
+    """Return a change of an episode's row in `meta/episodes`; timestamps are the video's."""
 
     def change(entries: list[dict[str, Any]]) -> None:
         for key, value in changes.items():
@@ -161,7 +161,7 @@ def test_contradictions_that_change_no_step_are_reported(
 
 @settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_no_damage_shifts_the_pictures(
+def test_no_damage_shifts_the_pictures_without_a_warning(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     """No step gets a wrong image without a warning, whatever bytes of the tables are damaged."""

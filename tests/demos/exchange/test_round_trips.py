@@ -155,7 +155,7 @@ def test_a_tub_round_trips(tmp_path: Path) -> None:
 
 
 def with_a_pause(data: Path) -> Path:
-    """Record eight steps; after a pause of 7 s, the last four have periods longer by 5 ms."""
+    """Record eight steps: four 50 ms apart and, after a pause of 7 s, four 80 ms apart."""
     times_ns = [n * 50_000_000 if n < 4 else 7 * 10**9 + n * 80_000_000 for n in range(8)]
     steps = [
         Step(action=(n / 10, 0.0), driver="person", state=(0.0, 0.0), captured_ns=0, decided_ns=at)

@@ -19,7 +19,7 @@ from shapechanger.policy import CloneNetwork, Framing, Network, Policy, PolicyCa
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import EpisodeHeader
 
-# A mean in single precision may miss a half by a rounding error, and is still rounded up.
+# A mean in single precision may be below a half by a rounding error; it is still rounded up.
 HALF: Final = 0.5 + 1e-4
 _ROUNDING: Final = 1e-4  # Tolerance of actions in single precision.
 
@@ -214,7 +214,7 @@ class ShrunkFrames:
 
     Attributes:
         framing: Crop and resolution.
-        view: Returns a frame of another camera for one of an episode; None for the same camera.
+        view: Converts a frame to the view of the policy's camera; None to leave it as it is.
         size: Rows and columns of the last frame before it was reduced; None before the first frame.
         seen: Digests of the frames.
     """

@@ -136,7 +136,7 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
             steps; None for continuous actions.
         errors: Mean absolute error of each value, in its unit.
         within: Share of steps with every value within the tolerance.
-        tolerance: Maximum error of such a value, as a share of half its range.
+        tolerance: The tolerance of a value, as a share of half its range.
         worst: Indices of the steps with the largest errors, worst first.
         predicted: Actions of the policy at some steps, in order of time; () for classes.
         target: Actions of the driver at the same steps.

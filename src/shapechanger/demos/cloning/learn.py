@@ -98,10 +98,10 @@ def learn(
     threads.
 
     `start` is a policy of the same layouts to train further; its single network keeps its inputs
-    and outputs. `rehearsal` is data that it was trained on, mixed in so that they are not
-    forgotten. If the driver is `symmetric`, steering to both sides equally in the long run, as an
-    expert in random worlds does, the settings state the share of mirrored images; otherwise it
-    depends on how evenly the driver steered.
+    and outputs. `rehearsal` is data that this policy was trained on, mixed in against forgetting.
+    If the driver is `symmetric`, steering to both sides equally in the long run, as an
+    expert in random worlds does, the settings state the share of mirrored images; otherwise the
+    share depends on how evenly the driver steered.
     """
     seed = check_seed(seed, DemosError)
     began = time.monotonic()

@@ -86,7 +86,7 @@ class Eyes(nn.Module):
         if self._cells is not None:
             seen = edges(pictures, self._cells) - 1.0
         else:
-            # Each image is one row: several times faster than over three dimensions.
+            # The statistics of flat rows are several times faster than over three dimensions.
             rows = pictures.permute(0, 2, 3, 1).flatten(1)
             spread, mean = (x[:, None, None, None] for x in torch.std_mean(rows, dim=1))
             seen = (pictures - mean) / (spread + _MIN_SPREAD)

@@ -359,7 +359,7 @@ def longest_period_s(control_hz: float) -> float:
 
 
 def rate_jitter(periods_s: Sequence[float], control_hz: float) -> float:
-    """Return how far the rate of a recording of so many steps per second varied, as a share of it.
+    """Return how far the rate of a recording varied, as a share of its nominal rate, `control_hz`.
 
     It is the larger deviation of the 5th and the 95th percentile of the times between steps, s; at
     most 0.25, and 0 for fewer than 20 times.

@@ -66,9 +66,9 @@ _MAX_FEATURES: Final = 512  # Columns with more values become one array feature.
 _Size = tuple[int, int] | None
 _NS_PER_S: Final = 1e9
 _PAUSE_PERIODS: Final = 30.0
-_NEAR: Final = (0.5, 1.5)  # Times the median period; a missing record doubles a period.
+_NEAR: Final = (0.5, 1.5)  # In median periods; a missing record doubles a period.
 _MIN_PERIODS: Final = 10  # Drives with fewer periods get the rate of all drives.
-_RATE_RATIO: Final = 1.3  # Rates above this ratio have two settings, which differ by a third.
+_RATE_RATIO: Final = 1.3  # A larger ratio of two rates means two settings of the rate.
 _SLOWEST_HZ, _FASTEST_HZ = 1.0, 100.0  # Range of `control_hz` in a profile.
 # Nominal rates are multiples of these steps (Hz), within these relative tolerances: a loop that
 # sleeps for the rest of each period, such as Donkeycar's, is up to 2 % slow.

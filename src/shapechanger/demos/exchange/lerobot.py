@@ -110,7 +110,7 @@ class _Dataset:
         if _ACTION not in sizes:
             raise DemosError(f"{path} has no numeric feature {_ACTION!r} to import as action.")
         states = [k for k in sizes if k.startswith(_OBSERVATION) and not k.startswith(_CAMERAS)]
-        self._states = sorted(states, key=lambda key: key != _STATE)  # Stable: the state first.
+        self._states = sorted(states, key=lambda key: key != _STATE)  # The state first.
         single = [key for key in (_REWARD, DONE, _TERMINATED) if sizes.get(key) == 1]
         self._sizes = {key: sizes[key] for key in (_ACTION, *states)}
         self._sizes |= dict.fromkeys((*single, *_KEYS), 1)

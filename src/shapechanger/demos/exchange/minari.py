@@ -1,8 +1,8 @@
 """Minari datasets: lossless from Shapechanger, and as complete as possible from other programs.
 
-An observation is the image, the state, or a dictionary with an image and a state. The last one is
-repeated, because Minari needs one more than there are steps. An image is stored as the recorded
-JPEG, which Minari decodes on reading, except below 32 pixels; such images are not exported.
+An observation is the image, the state, or a dictionary of both. The last observation is repeated,
+because Minari needs one more than there are steps. Images are stored as the recorded JPEGs, which
+Minari decodes on reading; images below 32 pixels, which it does not decode, are not exported.
 `infos/frame` is the index of the image in the episode, and `infos/step` contains all fields without
 a separate column, as JSON. An unknown reward is NaN. `metadata.json` has the episodes' headers.
 

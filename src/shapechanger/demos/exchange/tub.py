@@ -6,8 +6,8 @@ proposed. In other modes the policy drives, but in "local_angle" the person sets
 
 Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
 metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted
-indexes are values of the records' `_index`; `_timestamp_ms` is Unix time, and `_session_id` names
-the start of the car. Version 1 has a file `record_N.json` per record, its image next to it,
+indexes are values of the records' `_index`; `_timestamp_ms` is Unix time, and a start of the car
+begins a new `_session_id`. Version 1 has a file `record_N.json` per record, its image next to it,
 optionally `milliseconds` since the start, `meta.json`, and the deleted numbers in `exclude.json`.
 
 Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py for version 2,
