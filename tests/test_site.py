@@ -109,7 +109,6 @@ def test_the_guide_of_the_car_has_its_pins() -> None:
 
 @contextmanager
 def _served(folder: Path) -> Iterator[str]:
-    """Serve a folder, and yield its address."""
 
     class Quiet(SimpleHTTPRequestHandler):
         def log_message(self, *_: Any) -> None:

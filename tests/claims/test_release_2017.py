@@ -75,7 +75,6 @@ _RELEASED = {
 
 
 def _edited(name: str) -> mujoco.MjModel:
-    """Return the body of this name, made by edits."""
     family = PENDULUM if "Pendulum" in name else ANT
     source = "inverted_pendulum.xml" if "Pendulum" in name else "ant.xml"
     return compile_body(family.load(Path(ASSETS) / source), family.bodies[name])

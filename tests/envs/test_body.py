@@ -79,7 +79,6 @@ def _everything(env: Any) -> dict[str, Any]:
 
 
 def _episode(env: Any, seed: int) -> list[np.ndarray]:
-    """Return the observations of twenty steps."""
     observation, _ = env.reset(seed=seed)
     rng = np.random.default_rng(seed)
     seen = [observation]

@@ -99,7 +99,6 @@ def _lifted(env: Any, pose: np.ndarray) -> np.ndarray:
 
 
 def _in_the_air(env: Any) -> None:
-    """Start an episode without contacts."""
     env.reset(seed=0)
     env.set_state(_lifted(env, env.data.qpos), env.data.qvel.copy())
 

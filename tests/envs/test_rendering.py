@@ -43,7 +43,6 @@ def _hide(env: Any, *, but: str = "") -> None:
 
 
 def _without_shadows(env: Any) -> None:
-    """Disable shadows and reflections."""
     model = env.unwrapped.model
     model.light_castshadow[:] = 0
     model.mat_reflectance[:] = 0.0

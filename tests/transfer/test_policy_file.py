@@ -277,7 +277,6 @@ def test_a_damaged_file_is_refused(path: Path, name: str) -> None:
 
 
 def _forged(content: bytes, change: Callable[[Header], object]) -> bytes:
-    """Return a file with another header."""
     length = int.from_bytes(content[:8], "little")
     header = json.loads(content[8 : 8 + length])
     change(header)

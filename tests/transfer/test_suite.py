@@ -57,7 +57,6 @@ def _study(plan: Plan) -> str:
 
 
 def _run(plan: Plan, out: Path, executor: Executor) -> Study:
-    """Run a study in the suite's folder."""
     return run_study(plan, open_study_folder(plan, out, _study(plan)), executor=executor)
 
 

@@ -25,7 +25,6 @@ _TINY = PpoSettings(
 
 @functools.cache
 def _teacher(vehicle: str = "Car") -> TrainedPolicy:
-    """Return a barely trained teacher."""
     env = EnvRef(f"shapechanger/{vehicle}Ranges-v1", {"courses": [0, 1]})
     return Sb3Learner("tiny", _TINY).train(env, 8, 0, on_evaluation=lambda _: None)
 

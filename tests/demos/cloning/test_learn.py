@@ -37,7 +37,6 @@ def keys() -> Cloned:
 def _cloned(
     data: Dataset, settings: CloneSettings, start: CameraPolicy | None = None, **more: Any
 ) -> Cloned:
-    """Clone an expert, as a study does."""
     start = CameraPolicy.fresh(settings, 0, data.action_layout) if start is None else start
     return learn(data, settings=settings, start=start, symmetric=True, **more)
 

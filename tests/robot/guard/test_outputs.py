@@ -34,7 +34,6 @@ _TANK = GuardPlan(
 
 
 def _pair(driver: str, rest: float = 0.0) -> GuardPlan:
-    """Two outputs of one action."""
     both = tuple(OutputPlan(name, driver, mix={"lift": 1.0}) for name in ("left", "right"))
     return GuardPlan("crane", (ActionPlan("lift", rest=rest),), both)
 

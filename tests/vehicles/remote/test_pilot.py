@@ -118,7 +118,6 @@ def _served(
 
 
 def _pilot(robot: RunningRobot) -> int:
-    """Return the process id of the policy."""
     text = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "remote.pilot"]
     return int(subprocess.check_output(text).split()[0])
 
