@@ -17,7 +17,6 @@ _EXTRAS: dict[str, list[str]] = _PYPROJECT["project"]["optional-dependencies"]
 
 
 def _pins() -> dict[str, str]:
-    """Return the version of each package in constraints.txt."""
     lines = (_ROOT / "constraints.txt").read_text().splitlines()
     pins = [line.split("==") for line in lines if line and not line.startswith("#")]
     return {canonicalize_name(name): version for name, version in pins}

@@ -50,7 +50,6 @@ _OTHER = (Stretch("shank_*", 1.5), Cut("shank_4", 0.25), Gear("hip_1", to=40.0))
 
 
 def _compiled(model: mujoco.MjModel) -> bytes:
-    """Return all numbers of a compiled model."""
     buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
     return buffer.tobytes()

@@ -60,6 +60,11 @@ def robot(**changes: Any) -> RobotState:
     return RobotState(**(fields | changes))
 
 
+def test_a_robot_has_a_height_and_the_number_of_any_name() -> None:
+    assert robot().height == 0.5
+    assert robot()["knee/angle"] == 0.3
+
+
 def test_a_task_is_found_by_name_class_function_or_object() -> None:
     """Classes take options; each has a name for messages."""
     walk, name = as_task("walk", {"forward": 2.0})

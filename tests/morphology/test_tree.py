@@ -11,6 +11,7 @@ import pytest
 from shapechanger.morphology import Body, Cut, Gear, Mass, Stretch, TotalMass, compile_body, reshape
 from shapechanger.morphology.pose import (
     StartRules,
+    floor_height,
     moved_trees,
     robot_bodies,
     standing_height,
@@ -342,6 +343,15 @@ def test_a_joint_that_its_damping_locks_is_at_rest() -> None:
     locked = _WALKER.replace('name="leg" axis', 'name="leg" damping="1e11" axis')
     rules = StartRules(mujoco.MjModel.from_xml_string(locked))
     assert rules.robot_dofs.sum() == 6
+
+
+@pytest.mark.parametrize(("floor", "height"), [('pos="0 0 -.7"', -0.7), ('contype="0"', 0.0)])
+def test_the_floor_need_not_be_at_zero(floor: str, height: float) -> None:
+    """The floor's height is 0 if there is no floor that the robot can touch."""
+    text = _WALKER.replace('size="9 9 1"/>', f'size="9 9 1" {floor} conaffinity="0"/>')
+    text = text.replace('conaffinity="0"', "") if "pos" in floor else text
+    model = mujoco.MjModel.from_xml_string(text)
+    assert floor_height(model, start_pose(model)) == pytest.approx(height)
 
 
 def test_large_models_have_dense_jacobians_on_mujoco_4_0_0() -> None:

@@ -175,14 +175,12 @@ def test_steps_and_resets_are_no_edits() -> None:
 
 
 def _other(value: Any, kind: np.dtype[Any]) -> Any:
-    """Return another value of the same type."""
     if kind.kind == "S":
         return b"x" if value != b"x" else b"y"
     return np.nextafter(value, np.inf, dtype=kind) if kind.kind == "f" else value ^ 1
 
 
 def _restore(model: Any, original: Any) -> None:
-    """Write back all numbers of a copied model."""
     for name in _ARRAYS:
         getattr(model, name)[...] = getattr(original, name)
     for part in ("opt", "stat"):

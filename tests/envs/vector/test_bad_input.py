@@ -69,6 +69,7 @@ def test_bodies_must_share_their_spaces(bodies: list[Any], sentence: str) -> Non
     [
         ("BigAnd", {}, "Did you mean 'BigAnt'"),
         ("shapechanger/Nothing-v1", {}, "No environment matches 'Nothing'"),
+        ("nowhere:Nothing-v1", {}, "No environment matches 'nowhere:Nothing-v1'"),
         ("Ant", {"autoreset_mode": "SomeStep"}, "Did you mean 'SameStep'"),
         ("Ant", {"backend": "wrap"}, r"No backend matches 'wrap'\. Did you mean 'warp'"),
         ("Ant", {"bodies": ["Ant"]}, "2 envs and 1 bodies"),

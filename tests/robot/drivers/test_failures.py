@@ -89,7 +89,6 @@ def bench(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def _state_after(bench: Bench, *values: float) -> dict[str, Any]:
-    """Return the state after writes without a failure."""
     sound = bench()
     output = sound.open()
     for i, value in enumerate(values):

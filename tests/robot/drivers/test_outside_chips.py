@@ -33,7 +33,6 @@ driver = "bh1750"
 
 
 def _install(folder: Path, monkeypatch: pytest.MonkeyPatch, entries: str) -> None:
-    """Install a package that consists of entry points."""
     info = folder / "outside-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: outside\nVersion: 1.0\n")

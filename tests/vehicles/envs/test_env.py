@@ -36,7 +36,6 @@ def _car(**arguments: Any) -> VehicleEnv:
 
 
 def _played(env: VehicleEnv, seed: int, steps: int = 25) -> list[Any]:
-    """Return observations, rewards and poses of an episode."""
     rng = np.random.default_rng(seed)
     found: list[Any] = [env.reset(seed=seed)[0].tolist()]
     for _ in range(steps):
