@@ -25,7 +25,7 @@ class Case(NamedTuple):
     """One kind of study, simulated many times.
 
     Attributes:
-        data: Distribution of the areas of single seeds.
+        data: Distribution of the areas under the learning curves of single seeds.
         spread: Standard deviation divided by the mean, in percent.
         n_seeds: Seeds in each of the two arms.
     """

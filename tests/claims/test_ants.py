@@ -60,7 +60,6 @@ def _random_body(seed: int) -> Body:
 
 
 def _stretched(seed: int) -> Body:
-    """Return an ant with other lengths of thighs and shanks."""
     rng = np.random.default_rng(seed)
     thighs, shanks = rng.uniform(0.5, 2.5, 2)
     return Stretch("aux_*", float(thighs)), Stretch("shank_*", float(shanks))

@@ -45,7 +45,6 @@ def test_swapped_pins_drive_a_car_backward(tmp_path: Path) -> None:
 
 
 def _actions() -> list[tuple[float, ...]]:
-    """Return five seconds of actions without a collision."""
     rng = np.random.default_rng(3)
     drawn = rng.uniform((-0.3, 0.2), (0.3, 0.7), (100, 2)).astype(np.float32)
     return [tuple(action.tolist()) for action in drawn]

@@ -1,4 +1,4 @@
-"""Layouts of the humanoid and the double pendulum beyond their joints."""
+"""Observed inertias, twists, forces and contacts are what their layouts state."""
 
 from __future__ import annotations
 

@@ -49,7 +49,6 @@ def _without_shadows(env: Any) -> None:
 
 
 def _differs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the pixels that differ by more than rounding."""
     return np.any(np.abs(one.astype(int) - other.astype(int)) > 4, axis=2)
 
 

@@ -136,7 +136,7 @@ class DeviceFinger(Worlds):
         self._follow()
 
     def _controls(self, constants: dict[str, Tensor]) -> Tensor:
-        """Return the controls for the command path's tensions, like `HeldTensions`."""
+        """Return the controls for the command path's tensions, as `plant.HeldTensions` does."""
         least, most, step = constants["least"], constants["most"], constants["step"]
         tensions = least + self._shares * (most - least)
         rounded = shares(torch.floor(tensions / step) * step, least, most)
@@ -320,7 +320,7 @@ def _fingertip(angles: Tensor) -> Tensor:
     return torch.stack(tip_at(cos, sin), dim=1)
 
 
-# Distance from a whole number of simulation steps within which rounding can add a step to a delay.
+# Relative distance to a whole number of steps below which rounding can add one to a delay.
 _WHOLE: Final = 1e-6
 
 

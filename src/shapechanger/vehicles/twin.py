@@ -1,4 +1,4 @@
-"""Courses as places for a robot's twin, and the part of a profile that simulations need."""
+"""Simulated courses for a robot's twin, and what simulations need of its profile."""
 
 from __future__ import annotations
 

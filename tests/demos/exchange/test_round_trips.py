@@ -41,7 +41,6 @@ _MS = 10**6
 def _steps(
     draw: st.DrawFn, image: tuple[int, int] | None, state: bool, grey: bool
 ) -> list[tuple[Step, bytes | None, list[str]]]:
-    """Draw steps with repeated images, and their marks."""
     steps = []
     clock = 0
     for number in range(draw(st.integers(1, 4))):

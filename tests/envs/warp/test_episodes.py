@@ -49,7 +49,7 @@ def test_same_step_returns_the_start_and_keeps_the_end() -> None:
 
 
 def test_infos_of_a_restart_join_those_of_steps() -> None:
-    """Infos of runners have the place after a restart, and the speed after a step."""
+    """After a restart the infos have the place; the speed is in the infos of the last step."""
     envs = shapechanger.make_vec("Hopper", 2, backend="warp", device="cpu", max_episode_steps=1)
     envs.reset(seed=0)
     infos = envs.step(torch.zeros(2, 3))[-1]
@@ -106,7 +106,7 @@ def test_worlds_without_seeds_differ() -> None:
 
 
 def test_the_noise_is_uniform_and_normal() -> None:
-    """Means and variances fit the distributions, and streams are independent."""
+    """Means and variances fit the distributions; seeds and episodes are independent."""
     seeds, episodes = torch.arange(200), torch.zeros(200, dtype=torch.int64)
     flat = uniforms(seeds, episodes, 0, 500)
     assert flat.min() >= 0.0

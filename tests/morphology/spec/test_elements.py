@@ -1,4 +1,4 @@
-"""Selection, naming and copies of elements; frames and a total mass are written out."""
+"""Selection, naming and copies of elements; frames and a total mass become their own numbers."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ def shipped(kind: str) -> Profile:
 
 
 class HeldPins(Hardware):
-    """gpiozero's mock pins, which keep their level when they are closed."""
+    """gpiozero's mock pins, which closing the hardware leaves as they are."""
 
     def __init__(self, kind: type[MockPin] = MockPWMPin) -> None:
         super().__init__()

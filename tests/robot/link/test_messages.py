@@ -67,7 +67,7 @@ def test_a_large_message_is_refused_before_it_is_read() -> None:
         encode(messages.Take()) + b"\x00",
     ],
 )
-def test_a_false_length_costs_no_memory(data: bytes) -> None:
+def test_false_lengths_deep_nesting_and_trailing_bytes_are_refused(data: bytes) -> None:
     with pytest.raises(LinkError):
         decode_client_message(data)
 

@@ -91,7 +91,7 @@ _MOUNTED = """
 """
 
 
-def test_offsets_are_up_and_left_and_angles_down_left_and_clockwise() -> None:
+def test_jitter_moves_up_and_left_and_turns_down_left_and_clockwise() -> None:
     few, sin, cos = 0.05, math.sin(0.05), math.cos(0.05)
     for jitter, place, ahead, up in (
         (CameraJitter(), (0.05, 0.0, 0.12), (1, 0, 0), (0, 0, 1)),
@@ -136,7 +136,6 @@ _ALL = pytest.mark.parametrize("change", CORRUPTIONS.values(), ids=CORRUPTIONS)
 
 
 def _picture(height: int = 120, width: int = 160) -> Picture:
-    """Return an image with edges and all levels."""
     rng = np.random.default_rng(0)
     rough = rng.integers(0, 256, (height // 8 + 1, width // 8 + 1, 3), np.uint8)
     return np.kron(rough, np.ones((8, 8, 1), np.uint8))[:height, :width].copy()

@@ -231,7 +231,7 @@ def matched_commands(
 
 
 def _ranges(layout: Layout) -> list[_Range]:
-    """Return a finite range for each number; a missing bound is -1 or 1, or 1 beyond the other."""
+    """Return finite ranges: a missing bound is -1 or 1, or else 1 below or above the other one."""
     low, high = layout.low, layout.high
     bottom = np.where(np.isfinite(low), low, np.minimum(-1.0, high - 1.0))
     top = np.where(np.isfinite(high), high, np.maximum(1.0, low + 1.0))

@@ -134,7 +134,8 @@ class Camera:
     def pace(self) -> int:
         """Wait until the next frame is due at the plan's rate; return that time: monotonic, ns.
 
-        A late frame is due at once, and later frames are counted from its time.
+        A late frame is due at once. After a frame that is more than a period late, the schedule
+        starts again.
         """
         period_ns = round(1e9 / self.plan.fps)
         self.wait(at_most_s=max(0, self._next_ns - time.monotonic_ns()) / 1e9)

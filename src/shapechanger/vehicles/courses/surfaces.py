@@ -71,7 +71,7 @@ class QuadMesh:
     ) -> None:
         """Add a solid, scaled and turned by a yaw, rad, about its origin, at a place, m, (3,).
 
-        The wall of a fitting is along x, with the lane at y > 0.
+        Before the turn, the wall of a fitting is along x, and the lane at y > 0.
         """
         faces, uvs = read_obj(_SOLIDS)[name][name]
         cosine, sine = np.cos(yaw), np.sin(yaw)
@@ -159,7 +159,7 @@ class Surfaces:
         return _level(corners, height, _CEILING_PERIOD, 0.9 * self.light_at(corners))
 
     def lamps(self) -> QuadMesh:
-        """Lamps, seen from below, with the middle of their texture cell everywhere."""
+        """Lamps, seen from below; all corners have the same texture coordinates: one colour."""
         mesh, z = QuadMesh(), self._course.ceiling_m - _GAP
         for lamp in self._course.lamps:
             mesh.add_solid("lamp", (lamp.x, lamp.y, z), lamp.yaw, (lamp.length, lamp.width, 0.0))
