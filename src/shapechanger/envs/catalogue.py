@@ -120,34 +120,51 @@ _VEHICLES: Final = (
 
 
 def _drive(
-    suffix: str, kind: str, steps: int, learner: str, summary: str = ""
+    suffix: str, entry_point: str, *, steps: int, learner: str, summary: str = ""
 ) -> dict[str, CatalogueEntry]:
     """Return an env of each vehicle with the same task, keyed by id."""
     entries: list[CatalogueEntry] = []
     for name, world in _VEHICLES:
-        body = name.lower()
-        about = f"{name}{suffix}", f"{body}: {summary or world}", f"vehicles.envs.{kind}", learner
-        entries.append(CatalogueEntry(*about, episode_steps=steps, kwargs={"vehicle": body}))
+        vehicle = name.lower()
+        entries.append(
+            CatalogueEntry(
+                f"{name}{suffix}",
+                f"{vehicle}: {summary or world}",
+                f"vehicles.envs.{entry_point}",
+                learner,
+                episode_steps=steps,
+                kwargs={"vehicle": vehicle},
+            )
+        )
     return _by_id(*entries)
 
 
-VEHICLE_ENVS: Final = _drive("", "vehicle:VehicleEnv", 1000, "cloning")
+VEHICLE_ENVS: Final = _drive("", "vehicle:VehicleEnv", steps=1000, learner="cloning")
 """Envs of vehicles with a camera, keyed by id; their bodies form no family."""
 RANGES_ENVS: Final = _drive(
-    *("Ranges", "ranges:RangesEnv", 400, "ppo-drive"),  # Short, so that learners see more courses.
-    "the same task with distances instead of images; fast",
+    "Ranges",
+    "ranges:RangesEnv",
+    steps=400,  # Short, so that learners see more courses.
+    learner="ppo-drive",
+    summary="the same task with distances instead of images; fast",
 )
 """Envs of vehicles with distances instead of images, keyed by id."""
 WAYPOINT_ENVS: Final = _drive(
-    *("Waypoint", "vehicle:WaypointEnv", 1000, "waypoint"),
-    "camera and action are the same for all vehicles",
+    "Waypoint",
+    "vehicle:WaypointEnv",
+    steps=1000,
+    learner="waypoint",
+    summary="camera and action are the same for all vehicles",
 )
 """Envs of vehicles with waypoints as actions, keyed by id."""
 
 
 def _finger(name: str, entry_point: str, task: str, steps: int) -> CatalogueEntry:
     return CatalogueEntry(
-        *(name, f"finger of seven tendons: {task}", f"finger.{entry_point}", "ppo-finger"),
+        name,
+        f"finger of seven tendons: {task}",
+        f"finger.{entry_point}",
+        "ppo-finger",
         episode_steps=steps,
         device="shapechanger.finger.gpu",
     )
@@ -160,7 +177,9 @@ FINGER_ENVS: Final = _by_id(
 """Envs of the finger, keyed by id."""
 
 _OWN: Final = CatalogueEntry(
-    *("OwnRobot", "your MJCF or URDF file; give FILE or FILE@TASK as ENV", "envs.own:OwnRobotEnv")
+    "OwnRobot",
+    "your MJCF or URDF file; give FILE or FILE@TASK as ENV",
+    "envs.own:OwnRobotEnv",
 )
 OWN_ROBOT: Final = _OWN.id
 """Id of the env for a user's robot, from a file, with an optional task of the user."""
