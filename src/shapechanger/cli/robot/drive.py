@@ -20,13 +20,12 @@ from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import can_open, open_console, recall
-from shapechanger.robot.client.recordings import episodes_there, fetch_episode
+from shapechanger.robot.client.recordings import begin_recording, end_recording, fetch_episode
 from shapechanger.robot.client.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
 from shapechanger.robot.link.messages import Observation
 from shapechanger.vehicles.remote.pilot import PolicyDriver, require_fit
 
 _LOOK_EVERY_S: Final = 0.2
-_CLOSED_WITHIN_S: Final = 10.0  # Time that a memory card may need for the last steps, s.
 
 
 @dataclass(frozen=True)
@@ -88,19 +87,10 @@ class RobotDrive:
 @contextlib.contextmanager
 def recorded_to(data: Path, robot: RobotClient, name: str) -> Generator[None]:
     """Record on the robot within a block, and fetch it; after an error, print how to fetch it."""
-    before = {episode.id for episode in episodes_there(robot)}
-    robot.record(on=True)
+    before = begin_recording(robot)
     try:
         yield
-        if robot.recorder is not None and robot.recorder.recording:
-            robot.record(on=False)
-        until_s = time.monotonic() + _CLOSED_WITHIN_S
-        while True:
-            new = [episode for episode in episodes_there(robot) if episode.id not in before]
-            if all(episode.closed for episode in new) or time.monotonic() > until_s:
-                break
-            time.sleep(_LOOK_EVERY_S)
-        for episode in new:
+        for episode in end_recording(robot, before):
             fetch_episode(robot, episode.id, data)
             say(f"recorded {episode.kept} steps in {data / episode.id}")
     except BaseException:

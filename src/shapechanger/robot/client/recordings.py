@@ -41,6 +41,8 @@ from shapechanger.robot.client.teleop import Terminal
 from shapechanger.robot.link.messages import EpisodeSummary, Piece, Welcome
 
 _STEP: Final = b'{"kind":"step",'
+_CLOSED_WITHIN_S: Final = 10.0  # Time that a memory card may need for the last steps.
+_LOOK_EVERY_S: Final = 0.1
 
 
 def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[EpisodeSummary]:
@@ -151,6 +153,26 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
         if jpeg is not None and known != jpeg:
             file.write_bytes(jpeg)
     return lines
+
+
+def begin_recording(robot: RobotClient) -> set[str]:
+    """Begin to record on a robot, as a person, and return the ids of the episodes before."""
+    before = {episode.id for episode in episodes_there(robot)}
+    robot.record(on=True)
+    return before
+
+
+def end_recording(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
+    """End a recording, if it has not ended by itself, and return its episodes."""
+    state = robot.recorder
+    if state is not None and state.recording:
+        robot.record(on=False)
+    until_s = time.monotonic() + _CLOSED_WITHIN_S
+    while True:
+        new = [episode for episode in episodes_there(robot) if episode.id not in before]
+        if all(episode.closed for episode in new) or time.monotonic() > until_s:
+            return new
+        time.sleep(_LOOK_EVERY_S)
 
 
 def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> None:
