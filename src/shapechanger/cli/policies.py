@@ -404,7 +404,8 @@ class PoliciesPull:
     def run(self) -> None:
         if self.out.exists():
             raise HubError(f"{self.out} exists already: choose another name, or move it away.")
-        with tempfile.TemporaryDirectory() as folder:
+        # After Ctrl-C, a download may still write while the folder is removed.
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             commit = hub.pull(
                 self.repo, "policy", Path(folder), revision=self.revision, max_bytes=MAX_BYTES
             )

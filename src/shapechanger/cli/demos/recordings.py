@@ -377,7 +377,12 @@ class DemosPull:
     def run(self) -> None:
         if not 0.0 < self.max_gib < float("inf"):
             raise HubError(f"--max-gib must be above 0, got {self.max_gib}.")
-        with new_folder(self.out) as folder, tempfile.TemporaryDirectory(dir=folder) as place:
+        # After Ctrl-C, a download may still write while `place` is removed; then `new_folder` removes
+        # the rest.
+        with (
+            new_folder(self.out) as folder,
+            tempfile.TemporaryDirectory(dir=folder, ignore_cleanup_errors=True) as place,
+        ):
             commit = hub.pull(
                 self.repo,
                 "demonstrations",
