@@ -377,8 +377,7 @@ class DemosPull:
     def run(self) -> None:
         if not 0.0 < self.max_gib < float("inf"):
             raise HubError(f"--max-gib must be above 0, got {self.max_gib}.")
-        # After Ctrl-C, a download may still write while `place` is removed; then `new_folder` removes
-        # the rest.
+        # After Ctrl-C, a download may still write while `place` is removed.
         with (
             new_folder(self.out) as folder,
             tempfile.TemporaryDirectory(dir=folder, ignore_cleanup_errors=True) as place,
