@@ -25,7 +25,7 @@ from shapechanger.envs.suite_file import (
     shipped_suites,
     suite_tasks,
 )
-from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName, check_seed
+from shapechanger.errors import FailedRuns, RenderError, StudyError, check_seed, require_known
 from shapechanger.files import read_json, write_atomic, write_json
 from shapechanger.reports.numbers import interval_text
 from shapechanger.transfer.executor import Serial
@@ -81,9 +81,7 @@ class SuiteRun(StudyRuns):
         )
         check_seed(chosen.seed, StudyError)
         tasks = page.tasks
-        for name in self.only:
-            if name not in tasks:
-                raise UnknownName("study", name, tasks)
+        require_known("study", tasks, *self.only)
         executor = self.made_executor()
         failed: list[str] = []
         for name in self.only or tasks:

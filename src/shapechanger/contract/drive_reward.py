@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from shapechanger.errors import UnknownName
+from shapechanger.errors import require_known
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,7 @@ class DriveReward:
             UnknownName: If there is no such weight.
         """
         kinds: dict[str, Any] = {field.name: type(field.default) for field in fields(cls)}
-        for name in weights:
-            if name not in kinds:
-                raise UnknownName("weight of the reward", name, kinds)
+        require_known("weight of the reward", kinds, *weights)
         return cls(**{name: kinds[name](value) for name, value in weights.items()})
 
     def terms(

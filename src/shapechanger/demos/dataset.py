@@ -16,7 +16,7 @@ from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step, episodes_o
 from shapechanger.demos.episodes.records import is_episode, is_same_rate, rate_jitter
 from shapechanger.demos.exchange import import_episodes
 from shapechanger.demos.jpeg import decode_picture
-from shapechanger.errors import DemosError, UnknownName
+from shapechanger.errors import DemosError, require_known
 from shapechanger.layout import Layout
 
 DEMONSTRATORS: Final = ("person", "expert")
@@ -121,9 +121,7 @@ def load_dataset(
         DemosError: If there are no such steps, or the episodes do not match each other.
         UnknownName: If there is no such driver.
     """
-    for driver in drivers:
-        if driver not in DRIVERS:
-            raise UnknownName("driver", driver, DRIVERS)
+    require_known("driver", DRIVERS, *drivers)
     parts: list[Dataset] = []
     first: tuple[str, dict[str, Any]] | None = None
     periods_s: list[float] = []

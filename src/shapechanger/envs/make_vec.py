@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode
 
 from shapechanger.envs.catalogue import CATALOGUE, find
 from shapechanger.envs.vector.env import ThreadVectorEnv
-from shapechanger.errors import UnknownName, VectorEnvError
+from shapechanger.errors import UnknownName, VectorEnvError, require_known
 
 if TYPE_CHECKING:
     from shapechanger.envs.warp.env import WarpVectorEnv
@@ -103,8 +103,7 @@ def make_vec(
     count = _at_least_one("env", num_envs)
     if bodies is not None and len(bodies) != count:
         raise VectorEnvError(f"There are {count} envs and {len(bodies)} bodies.")
-    if backend not in _REFUSED:
-        raise UnknownName("backend", backend, _REFUSED)
+    require_known("backend", _REFUSED, backend)
     mode = _mode(autoreset_mode, backend)
     made_from = env_id if env_id in gym.registry or ":" in env_id else find(env_id).id
     own = {"threads": threads, "device": device, "bodies": bodies, "pool": pool}
@@ -185,9 +184,9 @@ def _at_least_one(what: str, number: int) -> int:
 def _mode(mode: AutoresetMode | str | None, backend: str) -> AutoresetMode:
     usual = AutoresetMode.SAME_STEP if backend == "warp" else AutoresetMode.NEXT_STEP
     known = {one.value: one for one in AutoresetMode}
-    wanted = usual if mode is None else known.get(str(getattr(mode, "value", mode)))
-    if wanted is None:
-        raise UnknownName("autoreset mode", str(mode), known)
+    name = usual.value if mode is None else str(getattr(mode, "value", mode))
+    require_known("autoreset mode", known, name)
+    wanted = known[name]
     if backend == "warp" and wanted is not usual:
         raise VectorEnvError(
             f"backend='warp' has no autoreset mode {wanted.value}: its worlds start again in the "

@@ -25,6 +25,7 @@ from shapechanger.errors import (
     MorphologyError,
     ShapechangerError,
     UnknownName,
+    require_known,
 )
 
 try:
@@ -398,8 +399,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return np.concatenate([data.qpos, data.qvel, data.cfrc_ext[1:].ravel()])
 
     def _number(self, name: str) -> float:
-        if name not in self._place_of:
-            raise UnknownName(f"number of {self.family.name}", name, self._place_of)
+        require_known(f"number of {self.family.name}", self._place_of, name)
         return float(self._all_numbers()[self._place_of[name]])
 
     def trunk_place(self) -> _Floats:

@@ -14,8 +14,8 @@ from shapechanger.errors import (
     EnvArgumentError,
     MissingExtra,
     SpaceMismatch,
-    UnknownName,
     check_seed,
+    require_known,
 )
 
 try:
@@ -209,9 +209,7 @@ class Reshapable(MujocoEnv):
             MorphologyError: If the body cannot be built.
             EnvArgumentError: If the seed is not a whole number from 0.
         """
-        for name in options or {}:
-            if name != "body":
-                raise UnknownName("option of reset", name, ("body",))
+        require_known("option of reset", ("body",), *(options or {}))
         if seed is not None:
             seed = check_seed(seed, EnvArgumentError, largest=None)
             self._body_rng = np.random.default_rng(seed)

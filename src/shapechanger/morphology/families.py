@@ -20,7 +20,7 @@ import msgspec
 import mujoco
 import numpy as np
 
-from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
+from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, require_known
 from shapechanger.morphology.edits import EDITS, Edit, part_of_the_way
 from shapechanger.morphology.edits.places import Stretch
 from shapechanger.morphology.edits.values import Friction, Gear, Mass
@@ -79,12 +79,11 @@ def _edit(item: Any) -> Edit:
             f'"edit", not of {item!r}.'
         )
     fields = dict(cast("Mapping[str, Any]", item))
-    kind = EDITS.get(str(fields["edit"]))
-    if kind is None:
-        raise UnknownName("edit", str(fields["edit"]), EDITS)
-    for name in fields:
-        if name not in ("edit", *kind.__struct_fields__):
-            raise UnknownName(f"field of {fields['edit']!r}", name, kind.__struct_fields__)
+    name = str(fields["edit"])
+    require_known("edit", EDITS, name)
+    kind = EDITS[name]
+    own = [field for field in fields if field != "edit"]
+    require_known(f"field of {name!r}", kind.__struct_fields__, *own)
     try:
         return msgspec.convert(fields, kind)
     except msgspec.ValidationError as error:
@@ -257,8 +256,7 @@ class Family:
         return as_body(value)
 
     def _named(self, kind: str, name: str, known: Mapping[str, Any]) -> Any:
-        if name not in known:
-            raise UnknownName(f"{kind} of the family {self.name}", name, known)
+        require_known(f"{kind} of the family {self.name}", known, name)
         return known[name]
 
     def body_at(self, values: Mapping[str, float], parts: Mapping[str, str] | None = None) -> Body:
@@ -301,8 +299,7 @@ class Family:
             UnknownName: If there is no such split.
             MorphologyError: If the family has no axes, or for "composition" not two places.
         """
-        if split not in get_args(Split):
-            raise UnknownName("split", split, get_args(Split))
+        require_known("split", get_args(Split), split)
         if not self.axes or (split == "composition" and len(self.parts) < 2):
             missing = "parts at two places" if self.axes else "axes"
             raise MorphologyError(f"The family {self.name} declares no {missing} to draw from.")

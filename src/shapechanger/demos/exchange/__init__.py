@@ -43,7 +43,7 @@ from shapechanger.demos.exchange.base import (
     whole_records,
 )
 from shapechanger.demos.exchange.files import new_folder
-from shapechanger.errors import DemosError, UnknownName
+from shapechanger.errors import DemosError, UnknownName, require_known
 from shapechanger.files import writing
 
 __all__ = [
@@ -289,8 +289,7 @@ def import_recording(
 def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterator[ExchangeEpisode]]:
     """Return the format of a folder, and an iterator over its episodes with intact records."""
     names = ["auto", *(name for name, form in formats().items() if form.read)]
-    if format not in names:
-        raise UnknownName("format", format, names)
+    require_known("format", names, format)
     form = formats()[find_format(path) if format == "auto" else format]
     if form.name not in _formats_of(path):
         raise DemosError(f"{path} is not {format}: expected {form.sign}; or omit --format.")

@@ -24,7 +24,7 @@ from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.episodes.records import longest_period_s
 from shapechanger.demos.exchange.files import load_jpeg
 from shapechanger.demos.jpeg import decode_picture
-from shapechanger.errors import DemosError, UnknownName
+from shapechanger.errors import DemosError, UnknownName, require_known
 from shapechanger.layout import Feature
 
 FORMATS: Final = ("csv", "minari", "lerobot", "tub", "mcap")
@@ -423,8 +423,7 @@ def features_of(
 def choose_camera(folder: Path, cameras: Sequence[str], context: ImportContext) -> str:
     """Return the chosen camera, or the only one; "" if there is no camera."""
     if context.camera:
-        if context.camera not in cameras:
-            raise UnknownName(f"camera of {folder}", context.camera, cameras)
+        require_known(f"camera of {folder}", cameras, context.camera)
         return context.camera
     if len(cameras) > 1:
         names = ", ".join(cameras)

@@ -18,7 +18,7 @@ from shapechanger.envs.checks import masked_options, one_seed_each
 from shapechanger.envs.warp.devices import at_once, without_gradients
 from shapechanger.envs.warp.reader import BodyReader, grouped
 from shapechanger.envs.warp.worlds import Worlds
-from shapechanger.errors import BadAction, UnknownName, VectorEnvError
+from shapechanger.errors import BadAction, VectorEnvError, require_known
 from shapechanger.layout import Layout
 
 _OPTIONS: Final = ("bodies", "reset_mask")
@@ -163,9 +163,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._require_open()
         seeds = one_seed_each(seed, self.num_envs)
         options = dict(options or {})
-        for name in options:
-            if name not in _OPTIONS:
-                raise UnknownName("option of reset", name, _OPTIONS)
+        require_known("option of reset", _OPTIONS, *options)
         if isinstance(options.get("reset_mask"), Tensor):
             options["reset_mask"] = options["reset_mask"].cpu().numpy()
         mask, _ = masked_options(options, self.num_envs)

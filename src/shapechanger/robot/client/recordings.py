@@ -30,7 +30,7 @@ from shapechanger.errors import (
     LinkError,
     OutputError,
     RobotRefused,
-    UnknownName,
+    require_known,
     translate_errors,
 )
 from shapechanger.files import cannot_write, write_atomic
@@ -54,9 +54,7 @@ def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[Episo
         found += page.episodes
     found.reverse()
     ids = [episode.id for episode in found]
-    for name in wanted:
-        if name not in ids:
-            raise UnknownName("episode", name, ids)
+    require_known("episode", ids, *wanted)
     return [episode for episode in found if not wanted or episode.id in wanted]
 
 

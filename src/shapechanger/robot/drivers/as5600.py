@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError, require_known
 from shapechanger.robot.drivers import chip
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
@@ -226,8 +226,7 @@ class SimulatedJoints(SimulatedSensor):
 
     def set_magnet(self, joint: str, state: Magnet) -> None:
         """Set the state of the magnet of a joint."""
-        if state not in _STATUS_OF:
-            raise UnknownName("fault of a magnet", state, _STATUS_OF)
+        require_known("fault of a magnet", _STATUS_OF, state)
         self.magnets[joint] = state
 
 

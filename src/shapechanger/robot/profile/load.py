@@ -8,7 +8,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from shapechanger.errors import OutputError, ProfileError, UnknownName, translate_errors
+from shapechanger.errors import (
+    OutputError,
+    ProfileError,
+    UnknownName,
+    require_known,
+    translate_errors,
+)
 from shapechanger.files import cannot_write, write_atomic, write_new
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.profile.read import read_profile
@@ -98,8 +104,7 @@ def starter_text(
     import tomlkit  # Only writing profiles needs it.
 
     shipped = shipped_profiles()
-    if kind not in shipped:
-        raise UnknownName("kind of robot", kind, shipped)
+    require_known("kind of robot", shipped, kind)
     if camera and camera not in CAMERAS:
         raise UnknownName("camera", camera, CAMERAS)
     document: Any = tomlkit.parse(profile_text(shipped[kind]))
@@ -174,8 +179,7 @@ def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile
         table: Any = document
         for name in tables:
             known = [k for k, v in table.items() if isinstance(v, dict)]
-            if name not in known:
-                raise UnknownName(f"table of {target.name}", name, known)
+            require_known(f"table of {target.name}", known, name)
             table = table[name]
         if isinstance(value, dict):
             entries: Any = tomlkit.inline_table()

@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable
 from typing import Concatenate, NamedTuple, ParamSpec, Self, TypeVar, get_type_hints
 
-from shapechanger.errors import RobotError, UnknownName, WorldError, translate_errors
+from shapechanger.errors import RobotError, WorldError, require_known, translate_errors
 from shapechanger.robot.drivers.as5600 import Magnet, SimulatedJoints
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.servos.simulation import ServoFault
@@ -169,8 +169,7 @@ class Operator:
     def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
         """Change the magnet of a joint's encoder; "" repairs it."""
         joints = {name: one for one in self._board.of_kind(SimulatedJoints) for name in one.magnets}
-        if joint not in joints:
-            raise UnknownName("joint with an encoder", joint, joints)
+        require_known("joint with an encoder", joints, joint)
         joints[joint].set_magnet(joint, state)
         self._board.record("fault", detail=f"magnet {joint} {state or 'well'}")
 

@@ -20,7 +20,7 @@ from shapechanger.contract.env_ref import (
     is_single_instance,
     measures_of,
 )
-from shapechanger.errors import UnknownName
+from shapechanger.errors import require_known
 
 EVALUATION_SEED: Final = 10_000_000
 """Seed of the first evaluation episode: far from the seeds of training."""
@@ -59,8 +59,7 @@ class Evaluation(msgspec.Struct, frozen=True):
     def value(self, measure: str) -> float:
         """Return the value of a measure, or the sum of a reward term."""
         known = {RETURN.name: self.mean_return, **self.measures, **self.terms}
-        if measure not in known:
-            raise UnknownName("measure", measure, known)
+        require_known("measure", known, measure)
         return known[measure]
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar, cast
 
 import msgspec
 
-from shapechanger.errors import StudyError, UnknownName
+from shapechanger.errors import StudyError, UnknownName, require_known
 from shapechanger.files import place_of, read_text
 from shapechanger.registry import LEARNERS as KINDS
 from shapechanger.transfer.learners import LearnerSettings
@@ -71,8 +71,7 @@ def tuning_text(learner: str, env: str) -> str:
 
 def learner_settings(name: str) -> LearnerSettings:
     """Return the shipped settings of a learner."""
-    if name not in LEARNERS:
-        raise UnknownName("learner", name, LEARNERS)
+    require_known("learner", LEARNERS, name)
     return LEARNERS[name]
 
 
@@ -98,9 +97,7 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Lear
         return learner, _converted(learner, KINDS.load(learner), dict(changed))
     settings = learner_settings(learner)
     known: dict[str, Any] = msgspec.structs.asdict(cast("Any", settings))
-    for setting in changed:
-        if setting not in known:
-            raise UnknownName(f"setting of {learner}", setting, known)
+    require_known(f"setting of {learner}", known, *changed)
     kind = cast("Any", type(settings))
     return learner, _converted(learner, kind, {**msgspec.to_builtins(settings), **changed})
 

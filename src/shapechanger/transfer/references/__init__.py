@@ -13,7 +13,7 @@ from typing import Final
 import msgspec
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import UnknownName
+from shapechanger.errors import require_known
 
 FOLDER: Final = Path(__file__).parent
 
@@ -61,6 +61,5 @@ def reference_of(env: EnvRef) -> EnvReference | None:
 
 def reference_policy(env_id: str) -> Path:
     """Return the file of the shipped policy of an env; UnknownName if it has none."""
-    if env_id not in load_references():
-        raise UnknownName("reference policy", env_id, load_references())
+    require_known("reference policy", load_references(), env_id)
     return FOLDER / f"{env_id.rpartition('/')[2]}.safetensors"

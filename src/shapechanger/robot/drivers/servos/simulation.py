@@ -26,7 +26,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
 from shapechanger.contract.world import World
-from shapechanger.errors import UnknownName
+from shapechanger.errors import UnknownName, require_known
 from shapechanger.robot.drivers.servos.settings import (
     COUNTS_PER_TURN,
     TRIPPED,
@@ -347,8 +347,7 @@ class Rig:
 
     def servo(self, tendon: str) -> SimulatedServo:
         """Return the servo of a tendon."""
-        if tendon not in self._names:
-            raise UnknownName("tendon", tendon, self._names)
+        require_known("tendon", self._names, tendon)
         return self._names[tendon]
 
     def tensions(self) -> dict[str, float]:
