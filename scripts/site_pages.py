@@ -56,7 +56,7 @@ def environment_pages() -> Pages:
         "# Environments",
         "`import shapechanger` registers these ids with Gymnasium. Their pages are made from the "
         "registry, the docstrings and the models of this version; "
-        "`shapechanger envs show ENV` prints the name, unit and range of each number.",
+        "`shapechanger envs ENV` prints the name, unit and range of each number.",
         table(("picture", "id", "body"), rows),
     )
     bodies: list[tuple[str, ...]] = []
@@ -98,7 +98,7 @@ def _environment(env_id: str) -> tuple[str, bytes | None]:
         "with": f"`{given}`" if given else "",
         "time limit": f"{steps:,} steps" if steps else "none",
         "solved at a return of": "" if threshold is None else f"{threshold:,.0f}",
-        f"changes from {first}": f"`shapechanger envs compare {first} {short}`" if differs else "",
+        f"changes from {first}": f"`shapechanger envs {first} {short}`" if differs else "",
         "class": f"[`{module}.{name}`][{module}.{name}]",
     }
     return _page(

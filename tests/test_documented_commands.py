@@ -16,6 +16,7 @@ import pytest
 
 from benchmarks.run import SUITES
 from shapechanger.cli.main import Group, find_command, options_of, parse
+from shapechanger.cli.policies import POLICY_FILES
 from shapechanger.envs.catalogue import env_ref
 from shapechanger.errors import ShapechangerError
 
@@ -81,9 +82,10 @@ def refusal(words: list[str]) -> str:
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             command = parse(words)
-        for name in ("env", "source", "target"):
+        for name in ("env", "other", "source", "target"):
             env_id = getattr(command, name, "")
-            if isinstance(env_id, str) and env_id and not env_id.isupper():  # A placeholder.
+            is_name = isinstance(env_id, str) and env_id and not env_id.isupper()  # A placeholder.
+            if is_name and not env_id.endswith(POLICY_FILES):
                 env_ref(env_id)
     except ShapechangerError as error:
         return str(error)
@@ -102,6 +104,10 @@ def test_commands_of_a_page_exist(page: Path) -> None:
     known = {name for kind in leaves().values() for name in options_of(kind)}
     named = {re.split(r"[ =.]", span)[0] for span in spans(page) if span.startswith("--")}
     assert named - known - FOREIGN - {"--help"} == set()
+
+
+def test_there_are_at_most_forty_commands() -> None:
+    assert len(leaves()) <= 40
 
 
 def _exists(words: list[str]) -> bool:

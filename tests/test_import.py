@@ -101,7 +101,7 @@ def test_missing_dependencies_of_mujoco_envs_name_the_extra(blocked: str) -> Non
     [
         ("stable_baselines3", "learn", "train InvertedPendulum"),
         ("tensorboard", "learn", "train InvertedPendulum --tensorboard logs"),
-        ("tyro", "cli", "envs list"),
+        ("tyro", "cli", "envs"),
     ],
 )
 def test_a_command_names_the_missing_extra(missing: str, extra: str, command: str) -> None:

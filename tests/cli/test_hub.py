@@ -1,4 +1,4 @@
-"""`policies push | pull` and `demos push | pull` with a fake Hub on this machine."""
+"""`hub push | pull` of policies and recordings, with a fake Hub on this machine."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def refused(answer: tuple[int, str, str]) -> str:
 
 @pytest.mark.parametrize("file", [POLICY, CLONES["car"]])
 def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, file: Path) -> None:
-    code, output, errors = run("policies", "push", file, "ada/reach")
+    code, output, errors = run("hub", "push", file, "ada/reach")
     assert (code, errors) == (0, "")
     assert f"{hub.address}/ada/reach/commit/" in output
     repository = hub.repositories["models/ada/reach"]
@@ -122,48 +122,48 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
     assert set(repository.files) == {"README.md", "shapechanger.json", "policy.safetensors"}
     card = repository.files["README.md"].decode()
     listed = json.loads(repository.files["shapechanger.json"])["files"]["policy.safetensors"]
-    for part in ("library_name: shapechanger", "**Action**", listed["sha256"], "policies pull"):
+    for part in ("library_name: shapechanger", "**Action**", listed["sha256"], "hub pull"):
         assert part in card
     # Other files of the repository are not downloaded.
     first = next(iter(repository.commits))
     repository.commit(repository.files | {"evil.pkl": pickle.dumps(print)})
     out = tmp_path / "pulled.safetensors"
-    code, output, errors = run("policies", "pull", "ada/reach", "--out", out)
+    code, output, errors = run("hub", "pull", "ada/reach", "--out", out)
     assert (code, errors) == (0, "")
     assert out.read_bytes() == file.read_bytes()
     assert next(reversed(repository.commits)) in output
     assert not any("evil" in request for request in hub.requests)
     pinned = ("--out", tmp_path / "folder" / "pinned.safetensors", "--revision", first)
-    assert first in run("policies", "pull", "ada/reach", *pinned)[1]
-    assert "exists already" in refused(run("policies", "pull", "ada/reach", "--out", out))
+    assert first in run("hub", "pull", "ada/reach", *pinned)[1]
+    assert "exists already" in refused(run("hub", "pull", "ada/reach", "--out", out))
 
 
 def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     """Pulled episodes are identical, with dropped steps; a second push replaces the first."""
     edit(drive(tmp_path / "data", 5), Drop(1, 2, "bad"))
     second = drive(tmp_path / "data", 3)
-    assert run("demos", "push", tmp_path / "data", "ada/drive", "--public")[0] == 0
+    assert run("hub", "push", tmp_path / "data", "ada/drive", "--public")[0] == 0
     repository = hub.repositories["datasets/ada/drive"]
     assert not repository.private
     card = repository.files["README.md"].decode()
     assert "`speed [m/s]`" in card
     assert "| episodes | 2 |" in card
-    code, output, _ = run("demos", "pull", "ada/drive", "--out", tmp_path / "back")
+    code, output, _ = run("hub", "pull", "ada/drive", "--out", tmp_path / "back")
     assert code == 0
     assert "2 episodes, 8 steps" in output
     before, after = all_of(tmp_path / "data"), all_of(tmp_path / "back")
     assert [e.path.name for e in after] == [e.path.name for e in before]
     assert [content_of(e) for e in after] == [content_of(e) for e in before]
     assert {path.name for path in (tmp_path / "back").iterdir()} == {e.path.name for e in before}
-    assert run("demos", "push", second, "ada/drive")[0] == 0
+    assert run("hub", "push", second, "ada/drive")[0] == 0
     names = {name.split("/")[1] for name in repository.files if name.startswith("episodes/")}
     assert names == {second.name}
 
 
 def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    pull = ("policies", "pull", "ada/none", "--out", out)
-    push = ("policies", "push", POLICY, "ada/new")
+    out = tmp_path / "out.safetensors"
+    pull = ("hub", "pull", "ada/none", "--out", out)
+    push = ("hub", "push", POLICY, "ada/new")
     assert "no model ada/none on the Hub, or it is private" in refused(run(*pull))
     assert "hf auth login" in refused(run(*pull, token=""))
     for token in ("", READER):
@@ -172,12 +172,12 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     answer = run(*push, token="hf_söcret")
     assert "söcret" not in refused(answer)
     for name in ("ant", "https://huggingface.co/ada/ant", "ada/-ant"):
-        assert "no name of a repository" in refused(run("policies", "pull", name, "--out", out))
+        assert "no name of a repository" in refused(run("hub", "pull", name, "--out", out))
     hub.repositories["models/ada/other"] = Repository()
     hub.repositories["models/ada/other"].commit({"model.bin": b"1"})
-    other = run("policies", "push", POLICY, "ada/other")
+    other = run("hub", "push", POLICY, "ada/other")
     assert "did not push, such as model.bin" in refused(other)
-    pull = ("policies", "pull", "ada/other", "--out", out)
+    pull = ("hub", "pull", "ada/other", "--out", out)
     assert "has no shapechanger.json" in refused(run(*pull))
     assert "no such revision" in refused(run(*pull, "--revision", "v9"))
     assert list(tmp_path.iterdir()) == []
@@ -196,38 +196,39 @@ def episodes(*names: str) -> dict[str, bytes]:
 
 
 DEMOS = "demonstrations"
+FILE = "out.safetensors"
 ABC = {"policy.safetensors": b"abc"}
 STEPS, EVIL = episodes("one/steps.jsonl"), episodes("../../evil")
 
 
 @pytest.mark.parametrize(
-    ("command", "held", "listed", "message"),
+    ("out", "held", "listed", "message"),
     [
-        ("policies", ABC, listing({"policy.safetensors": b"xy"}), "does not have the SHA-256"),
-        ("policies", ABC, listing({"model.pkl": b"abc"}), "'model.pkl', which is no policy file"),
-        ("policies", ABC, listing(ABC, DEMOS), "does not list files of policy"),
-        ("policies", ABC, b'{"format": 2}', "does not list files of policy in format 1"),
-        ("policies", ABC, b"[" * 10**6, "does not list files of policy"),
-        ("policies", ABC, listing(ABC), "policy.safetensors of ada/x is not a policy"),
-        ("demos", EVIL, listing(EVIL, DEMOS), "evil', which is no demonstrations file"),
-        ("demos", STEPS | episodes("one/x.pkl"), listing(STEPS, DEMOS), "'episodes/one/x.pkl'"),
-        ("demos", STEPS, listing(STEPS, DEMOS), "is not an episode"),
-        ("demos", {}, listing(STEPS, DEMOS), "has other files than its shapechanger.json names"),
+        (FILE, ABC, listing({"policy.safetensors": b"xy"}), "does not have the SHA-256"),
+        (FILE, ABC, listing({"model.pkl": b"abc"}), "'model.pkl', which is no policy file"),
+        (FILE, ABC, listing(ABC, DEMOS), "does not list files of policy"),
+        (FILE, ABC, b'{"format": 2}', "does not list files of policy in format 1"),
+        (FILE, ABC, b"[" * 10**6, "does not list files of policy"),
+        (FILE, ABC, listing(ABC), "policy.safetensors of ada/x is not a policy"),
+        ("out", EVIL, listing(EVIL, DEMOS), "evil', which is no demonstrations file"),
+        ("out", STEPS | episodes("one/x.pkl"), listing(STEPS, DEMOS), "'episodes/one/x.pkl'"),
+        ("out", STEPS, listing(STEPS, DEMOS), "is not an episode"),
+        ("out", {}, listing(STEPS, DEMOS), "has other files than its shapechanger.json names"),
     ],
 )
 def test_files_that_are_refused(
     run: Run,
     hub: FakeHub,
     tmp_path: Path,
-    command: str,
+    out: str,
     held: dict[str, bytes],
     listed: bytes,
     message: str,
 ) -> None:
-    kind = "models" if command == "policies" else "datasets"
+    kind = "datasets" if out == "out" else "models"
     repository = hub.repositories[f"{kind}/ada/x"] = Repository()
     repository.commit({**held, "shapechanger.json": listed})
-    assert message in refused(run(command, "pull", "ada/x", "--out", tmp_path / "out"))
+    assert message in refused(run("hub", "pull", "ada/x", "--out", tmp_path / out))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -235,20 +236,20 @@ def test_a_pull_that_is_too_large_or_interrupted_leaves_nothing(
     run: Run, hub: FakeHub, environment: dict[str, str], tmp_path: Path
 ) -> None:
     drive(tmp_path / "data", 3)
-    assert run("demos", "push", tmp_path / "data", "ada/drive")[0] == 0
+    assert run("hub", "push", tmp_path / "data", "ada/drive")[0] == 0
     hub.cut["shapechanger.json"] = 10
-    cut = ("demos", "pull", "ada/drive", "--out", tmp_path / "out")
+    cut = ("hub", "pull", "ada/drive", "--out", tmp_path / "out")
     assert "The Hub failed for ada/drive" in refused(run(*cut))
     hub.cut.clear()
     hub.requests.clear()
-    pull = ("demos", "pull", "ada/drive", "--out", tmp_path / "out", "--max-gib", "1e-9")
+    pull = ("hub", "pull", "ada/drive", "--out", tmp_path / "out", "--max-gib", "1e-9")
     assert "more than the limit of 1" in refused(run(*pull))
     assert not any("episodes" in request for request in hub.requests)
     names = hub.repositories["datasets/ada/drive"].files
     hub.stalled.update(name for name in names if name.endswith(".jsonl"))
     before = {path.name for path in tmp_path.iterdir()}
     with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, "demos", "pull", "ada/drive", "--out", "out"],
+        [sys.executable, "-c", PROGRAM, "hub", "pull", "ada/drive", "--out", "out"],
         cwd=tmp_path,
         env=environment | {"PYTHONPATH": os.pathsep.join(sys.path)},
         stderr=subprocess.PIPE,

@@ -16,7 +16,7 @@ from shapechanger.cli.console import StudyProgress
 from tests.cli.running import Cli
 from tests.drawing import run_python
 
-RENDER = ["envs", "render", "Ant", "--out", "ant.png"]
+RENDER = ["envs", "Ant", "--picture", "ant.png"]
 COMMAND = "from shapechanger.cli import main; main({arguments!r})"
 INTERRUPTED = """
 import sys
@@ -31,7 +31,7 @@ sys.meta_path.insert(0, CtrlC())
 @pytest.mark.system
 @pytest.mark.parametrize("name", ["tyro", "mujoco"])
 def test_ctrl_c_while_loading_prints_one_word(name: str) -> None:
-    code = INTERRUPTED.format(name=name) + COMMAND.format(arguments=["envs", "show", "Ant"])
+    code = INTERRUPTED.format(name=name) + COMMAND.format(arguments=["envs", "Ant"])
     done = run_python(code)
     assert done.returncode == 130
     assert done.stderr == "Stopped.\n"
@@ -39,12 +39,12 @@ def test_ctrl_c_while_loading_prints_one_word(name: str) -> None:
 
 @pytest.mark.system
 def test_ascii_output_replaces_missing_letters() -> None:
-    arguments = ["envs", "show", "InvertedPendulum"]
+    arguments = ["envs", "InvertedPendulum"]
     done = run_python(COMMAND.format(arguments=arguments), PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
     assert "hinge/velocity" in done.stdout
     assert done.stdout.isascii()
-    done = run_python(COMMAND.format(arguments=["envs", "show", "Ä"]), PYTHONIOENCODING="ascii")
+    done = run_python(COMMAND.format(arguments=["envs", "Ä"]), PYTHONIOENCODING="ascii")
     assert done.stderr.startswith("error: No environment matches '?'")
 
 
@@ -53,7 +53,7 @@ def test_ascii_output_replaces_missing_letters() -> None:
 @pytest.mark.parametrize(
     ("arguments", "variables", "words"),
     [
-        (["envs", "show", "Ant"], {"MUJOCO_GL": "nonsense"}, "one of egl, osmesa, glfw"),
+        (["envs", "Ant"], {"MUJOCO_GL": "nonsense"}, "one of egl, osmesa, glfw"),
         (RENDER, {"MUJOCO_GL": "disable"}, "cannot render with MUJOCO_GL=disable: set it to one"),
         (RENDER, {"DISPLAY": ":77"}, "GLFW opens no window on the display :77"),
     ],
@@ -123,18 +123,18 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
         ("train Car --tensorboard logs", "leave out --tensorboard"),
         ("train Ant --out .", "Cannot write .: it is a folder"),
         ("play Ant --out film.txt", "a film ends with one of .avi"),
-        ("envs show BigAmt", "No environment matches 'BigAmt'. Did you mean 'BigAnt'?"),
-        ("envs show Ant --body '[{'", "must be a JSON list of edits"),
-        ("envs compare CartPole-v1 Ant", "CartPole-v1 offers no certify_shift"),
-        ("envs render CartPole-v1 --out x.png", "CartPole-v1 offers no picture"),
-        ("envs show CartPole-v1", "publishes no observation_layout"),
-        ("envs show CartPole-v1 --body Ant", "CartPole-v1 takes no body"),
-        ("envs render Ant --out x.png --width -5", "1 to 8192 pixels"),
+        ("envs BigAmt", "No environment matches 'BigAmt'. Did you mean 'BigAnt'?"),
+        ("envs Ant --body '[{'", "must be a JSON list of edits"),
+        ("envs CartPole-v1 Ant", "CartPole-v1 offers no certify_shift"),
+        ("envs CartPole-v1 --picture x.png", "CartPole-v1 offers no picture"),
+        ("envs CartPole-v1", "publishes no observation_layout"),
+        ("envs CartPole-v1 --body Ant", "CartPole-v1 takes no body"),
+        ("envs Ant --picture x.png --width -5", "1 to 8192 pixels"),
         ("polices", "No command of `shapechanger` matches 'polices'. Did you mean 'policies'?"),
         ("policies shw", "`shapechanger policies` matches 'shw'. Did you mean 'show'?"),
         ("train Car --teacher", "--teacher needs a value after it"),
         ("train Car --teachr x", "matches '--teachr'. Did you mean '--teacher'?"),
-        ("demos cut x --frm 4", "Did you mean '--from'?"),
+        ("demos edit cut x --frm 4", "Did you mean '--from'?"),
         ("robot camera --profile x", "No option of `shapechanger robot camera` matches"),
         ("train Ant --bodies 3 --learner ppo-run", "ppo-run learns in one body. With --bodies"),
         ("train Ant --bodies 3 --body BigAnt", "--bodies must be above 0, and excludes --body"),

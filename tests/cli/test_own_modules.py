@@ -122,10 +122,10 @@ def test_a_policy_is_evaluated_in_its_robot_until_the_robot_changes(
     ):
         was = (project / file).read_text()
         (project / file).write_text(content)
-        for command, *more in (("evaluate",), ("play", "--out", "film.mp4")):
-            told = " ".join(cli.refused("policies", command, _POLICY, *more).split())
+        for command in (("policies", "evaluate", _POLICY), ("play", _POLICY, "--out", "film.mp4")):
+            told = " ".join(cli.refused(*command).split())
             assert words in told
-            assert "give --env to try the policy" in told
+            assert "or name the env, to try the policy" in told
         cli.output(*evaluate, "--env", "b.xml@cliown_task:Hold")
         (project / file).write_text(was)
     cli.output(*evaluate)

@@ -40,7 +40,7 @@ def test_policies_are_shown_and_listed(cli: Cli) -> None:
     output = cli.output("policies", "show", CLONES["car"])
     for part in ("steering, throttle", "shapechanger train Car"):
         assert part in output
-    lines = cli.output("policies", "list", CLONES["car"].parent).splitlines()
+    lines = cli.output("policies", "show", CLONES["car"].parent).splitlines()
     assert sum("cloning" in line for line in lines) == len(CLONES)
 
 
@@ -122,11 +122,11 @@ def trained(tmp_path: Path, cli: Cli) -> Path:
 
 def test_a_folder_is_listed(trained: Path, cli: Cli) -> None:
     (trained.parent / "other.safetensors").write_text("no")
-    output = cli.output("policies", "list", trained.parent)
+    output = cli.output("policies", "show", trained.parent)
     for part in ("mine.safetensors", "shapechanger/InvertedPendulum-v1", "is not a policy"):
         assert part in output
     (trained.parent / "empty").mkdir()
-    answer = cli.refused("policies", "list", trained.parent / "empty")
+    answer = cli.refused("policies", "show", trained.parent / "empty")
     assert "There is no policy in" in answer
 
 
@@ -134,8 +134,10 @@ def test_a_folder_is_listed(trained: Path, cli: Cli) -> None:
 def test_clones_are_evaluated_and_played(tmp_path: Path, cli: Cli) -> None:
     """A clone also acts in another vehicle, but not in a body with other actions."""
     film = ("--max-steps", 3, "--out", tmp_path / "film.mp4")
-    for env in ([], ["--env", "Tank"]):
-        assert "in 3 steps" in cli.output("policies", "play", CLONES["car"], *film, *env)
+    for shown in ([CLONES["car"]], ["Tank", "--policy", CLONES["car"]]):
+        assert "in 3 steps" in cli.output("play", *shown, *film)
+    both = cli.refused("play", CLONES["car"], "--policy", CLONES["car"])
+    assert "give an env with --policy, or only the file" in both
     answer = cli.refused("policies", "evaluate", CLONES["car"], "--env", "Ant")
     assert "The actions of the policy are steering, throttle" in answer
 

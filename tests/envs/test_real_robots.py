@@ -210,7 +210,7 @@ def test_the_shift_of_a_robot_is_certified(robot: _Robot) -> None:
 
 @each_robot
 def test_a_robot_passes_the_exam(robot: _Robot) -> None:
-    """The robot passes `shapechanger envs check`, or fails with the expected message."""
+    """The robot passes `shapechanger envs --check`, or fails with the expected message."""
     if robot.no_exam:
         with pytest.raises(BrokenPromise, match=robot.no_exam):
             list(examine(robot.make))

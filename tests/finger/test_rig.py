@@ -135,7 +135,7 @@ def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
         state[lost] += rng.choice([-0.0314, 0.0314])
         said = senses.misfit(senses.read(state, (), np.zeros(7)))
         assert f"{TENDONS[lost]} is off by" in said
-        assert "robot home" in said
+        assert "robot calibrate --zeros" in said
 
 
 @pytest.mark.parametrize(

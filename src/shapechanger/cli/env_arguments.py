@@ -1,4 +1,4 @@
-"""Options that commands share: envs, bodies, policies, learners and the Hub."""
+"""Options that commands share: envs, bodies, policies and learners."""
 
 from __future__ import annotations
 
@@ -41,13 +41,6 @@ Learner = Annotated[
 Settings = Annotated[
     tuple[str, ...],
     tyro.conf.arg(help="Changed settings of the learner, as NAME=VALUE: learning_rate=3e-4."),
-]
-RepoName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="REPO")]
-Public = Annotated[
-    bool, tyro.conf.arg(help="Make a new repository public; it is private if not given.")
-]
-Revision = Annotated[
-    str, tyro.conf.arg(help="Commit, branch or tag; the newest commit if not given.")
 ]
 _REFERENCE: Final = "reference"
 

@@ -1,98 +1,102 @@
-"""`shapechanger envs`: list, show, compare, check and render environments."""
+"""`shapechanger envs`: list, show, compare, check and draw environments."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
+import gymnasium as gym
+import tyro
 from rich.table import Table
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console, print_table, say
-from shapechanger.cli.env_arguments import OneEnv, TwoEnvs, asked, opened
+from shapechanger.cli.env_arguments import Body, asked, opened, options_of
 from shapechanger.contract.env_ref import layouts_of
 from shapechanger.contract.testing import examine
-from shapechanger.envs.catalogue import ODRL_ENVS, summaries
+from shapechanger.envs.catalogue import ODRL_ENVS, env_ref, summaries
+from shapechanger.errors import StudyError
 from shapechanger.layout import Layout
 from shapechanger.reports.films import write_picture
 
 
-@dataclass(frozen=True)
-class EnvsList:
-    """List all envs."""
-
-    odrl: bool = False
-    """List each env of ODRL in a separate row."""
-
-    def run(self) -> None:
-        table = Table("id", "body", box=None, pad_edge=False)
-        if self.odrl:
-            for entry in ODRL_ENVS.values():
-                table.add_row(entry.id, entry.family)
-            print_table(table)
-            return
-        for env_id, summary in summaries().items():
-            table.add_row(env_id, summary)
-        robots = len({entry.family for entry in ODRL_ENVS.values()})
-        targets = len(ODRL_ENVS) - robots
-        table.add_row(
-            "shapechanger/odrl-ROBOT-SHIFT-LEVEL-v1",
-            f"{targets} targets of ODRL and their {robots} sources: `envs list --odrl`",
-        )
-        print_table(table)
-
-
 @dataclass(frozen=True, kw_only=True)
-class EnvsShow(OneEnv):
-    """Show the name, unit and range of each number of an env's observation and action."""
+class Envs:
+    """List the envs, show the numbers and units of one, compare two, check or draw one."""
 
-    def run(self) -> None:
-        with opened(self.ref) as env:
-            observation, action = layouts_of(env)
-            print_table(_layout_table("action", action))
-            print_table(_layout_table("observation", observation))
-            for name, unit in (("standing_height", "m"), ("healthy_z_range", "m"), ("body", "")):
-                value = getattr(env.unwrapped, name, None)
-                if value is not None and value != ():
-                    say(f"{name.replace('_', ' ')}: {_in_words(value)} {unit}".rstrip())
-
-
-@dataclass(frozen=True, kw_only=True)
-class EnvsCompare(TwoEnvs):
-    """Compare two envs, and list the changes from one to the other."""
-
-    def run(self) -> None:
-        from_, to = self.refs()
-        with opened(from_) as source, opened(to) as target:
-            asked(target, "certify_shift")
-            say(str(asked(source, "certify_shift")(source, target)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class EnvsCheck(OneEnv):
-    """Check that an env satisfies the contract that learners rely on."""
-
-    def run(self) -> None:
-        for question in examine(self.ref.make):
-            plain_console().print(Text.assemble(("kept", "green"), f"  {question}"))
-
-
-@dataclass(frozen=True, kw_only=True)
-class EnvsRender(OneEnv):
-    """Render an env's body in its start pose."""
-
-    out: Path
-    """The image to write, a PNG file."""
+    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[ENV]")] = ""
+    """Id of the env, such as BigAnt or shapechanger/BigAnt-v1; all envs are listed if not given."""
+    other: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[OTHER]")] = ""
+    """Id of another env; the changes from ENV to it are listed."""
+    body: Body = ""
+    options: str = ""
+    """More arguments of the env as JSON, such as '{"frame_skip": 4}'."""
+    other_body: Body = ""
+    other_options: str = ""
+    """More arguments of the other env as JSON."""
+    check: bool = False
+    """Check that the env satisfies the contract that learners rely on."""
+    picture: Path | None = None
+    """A PNG file to write with an image of the env's body in its start pose."""
     width: int = 640
     """Width of the image in pixels."""
     height: int = 480
     """Height of the image in pixels."""
+    odrl: bool = False
+    """List each env of ODRL in a separate row."""
 
     def run(self) -> None:
-        with opened(self.ref) as env:
-            write_picture(asked(env, "picture")(self.width, self.height), self.out)
-        say(f"wrote {self.out}")
+        if not self.env:
+            if self.body or self.options or self.check or self.picture:
+                raise StudyError("Name an env, such as `shapechanger envs Ant`.")
+            _list(odrl=self.odrl)
+            return
+        if not self.other and (self.other_body or self.other_options):
+            raise StudyError("--other-body and --other-options need a second env: name it too.")
+        ref = env_ref(self.env, self.body).having(options_of(self.options, "--options"))
+        if self.check:
+            for question in examine(ref.make):
+                plain_console().print(Text.assemble(("kept", "green"), f"  {question}"))
+        with opened(ref) as env:
+            if self.picture is not None:
+                write_picture(asked(env, "picture")(self.width, self.height), self.picture)
+                say(f"wrote {self.picture}")
+            if self.other:
+                to = env_ref(self.other, self.other_body)
+                with opened(to.having(options_of(self.other_options, "--other-options"))) as other:
+                    asked(other, "certify_shift")
+                    say(str(asked(env, "certify_shift")(env, other)))
+            elif self.picture is None and not self.check:
+                _show(env)
+
+
+def _list(*, odrl: bool) -> None:
+    table = Table("id", "family" if odrl else "body", box=None, pad_edge=False)
+    if odrl:
+        for entry in ODRL_ENVS.values():
+            table.add_row(entry.id, entry.family)
+        print_table(table)
+        return
+    for env_id, summary in summaries().items():
+        table.add_row(env_id, summary)
+    robots = len({entry.family for entry in ODRL_ENVS.values()})
+    targets = len(ODRL_ENVS) - robots
+    table.add_row(
+        "shapechanger/odrl-ROBOT-SHIFT-LEVEL-v1",
+        f"{targets} targets of ODRL and their {robots} sources: `envs --odrl`",
+    )
+    print_table(table)
+
+
+def _show(env: gym.Env[Any, Any]) -> None:
+    observation, action = layouts_of(env)
+    print_table(_layout_table("action", action))
+    print_table(_layout_table("observation", observation))
+    for name, unit in (("standing_height", "m"), ("healthy_z_range", "m"), ("body", "")):
+        value = getattr(env.unwrapped, name, None)
+        if value is not None and value != ():
+            say(f"{name.replace('_', ' ')}: {_in_words(value)} {unit}".rstrip())
 
 
 def _layout_table(side: str, layout: Layout) -> Table:

@@ -45,7 +45,7 @@ class Group:
 
 
 def _group(group: str, summary: str, modules: Mapping[str, Sequence[str]]) -> Group:
-    """Return a group from the commands in each module; `envs list` has the class `EnvsList`."""
+    """Return a group from the commands in each module; `suite run` has the class `SuiteRun`."""
     places = {
         name: f"{module}:{group.title()}{name.title().replace('-', '')}"
         for module, names in modules.items()
@@ -59,11 +59,7 @@ COMMANDS: Final = Group(
     "`shapechanger doctor`, then `shapechanger transfer InvertedPendulum BigInvertedPendulum "
     "--quick`; each command has --help.",
     {
-        "envs": _group(
-            "envs",
-            "Look at the envs: list, show, compare, check, render.",
-            {"envs": ("list", "show", "compare", "check", "render")},
-        ),
+        "envs": "envs:Envs",
         "train": "train:Train",
         "play": "policies:Play",
         "transfer": "transfer:Transfer",
@@ -72,34 +68,30 @@ COMMANDS: Final = Group(
             "Run, watch and merge suites: many studies with one page.",
             {"suite": ("run", "watch", "merge", "list")},
         ),
-        "methods": "transfer:Methods",
         "policies": _group(
             "policies",
-            "List, inspect, watch, evaluate, export, convert and share policies.",
-            {"policies": ("list", "show", "play", "evaluate", "export", "convert", "push", "pull")},
+            "Show, evaluate, export and convert policies.",
+            {"policies": ("show", "evaluate", "export", "convert")},
         ),
         "robot": _group(
             "robot",
             "Set up, serve, find, drive and test robots.",
             {
-                "robot.setup": ("init", "install", "key", "home", "safe-pins"),
+                "robot.setup": ("init", "install", "key"),
                 "robot.check": ("check",),
                 "robot.calibrate": ("calibrate",),
                 "robot.camera": ("camera",),
                 "robot.serve": ("serve",),
-                "robot.remote": ("find", "remember", "forget", "fetch", "stop"),
+                "robot.remote": ("find", "remember", "fetch", "stop"),
                 "robot.drive": ("drive",),
             },
         ),
         "demos": _group(
             "demos",
-            "Record, inspect, edit and share demonstrations, and learn from them.",
+            "Record, show, edit and convert demonstrations, and learn from them.",
             {
                 "demos.record": ("record", "replay"),
-                "demos.recordings": (
-                    *("list", "show", "cut", "bad", "good", "mark", "merge", "repair"),
-                    *("import", "export", "push", "pull"),
-                ),
+                "demos.recordings": ("show", "edit", "merge", "repair", "import", "export"),
                 "demos.train": ("train", "evaluate"),
             },
         ),
@@ -107,6 +99,11 @@ COMMANDS: Final = Group(
             "finger",
             "Record, identify and export a finger.",
             {"finger": ("record", "identify", "export")},
+        ),
+        "hub": _group(
+            "hub",
+            "Share policies and recordings on the Hugging Face Hub.",
+            {"hub": ("push", "pull")},
         ),
         "doctor": "doctor:Doctor",
     },

@@ -1,9 +1,8 @@
-"""`shapechanger play | policies`: watch, list, evaluate, export, convert and share policies."""
+"""`shapechanger play | policies`: watch, show, evaluate, export and convert policies."""
 
 from __future__ import annotations
 
 import math
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -15,15 +14,11 @@ import tyro
 from numpy.typing import NDArray
 from rich.table import Table
 
-from shapechanger import hub
 from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import (
     Body,
     EnvId,
     OwnLearner,
-    Public,
-    RepoName,
-    Revision,
     opened,
     policy_file,
 )
@@ -36,16 +31,18 @@ from shapechanger.envs.catalogue import (
     env_ref,
 )
 from shapechanger.envs.opengl import has_screen
-from shapechanger.errors import HubError, PolicyError, ShapechangerError, StudyError, check_seed
-from shapechanger.files import require_file, write_atomic
+from shapechanger.errors import ShapechangerError, StudyError, check_seed
 from shapechanger.identity import identify_env, texts_in
-from shapechanger.policy import MAX_BYTES, STEERING, CloneNetwork, PolicyCard, load_policy
+from shapechanger.policy import STEERING, CloneNetwork, PolicyCard, load_policy
 from shapechanger.reports.films import require_film, write_film
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.identities import ENV, known, require_same_env
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act, evaluate, random_actions
 from shapechanger.transfer.references import load_references
 from shapechanger.vehicles.expert import PERIOD_S
+
+POLICY_FILES = (".safetensors", ".onnx")
+"""Suffixes of files of policies."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +97,9 @@ class Watching:
 class Play(Watching):
     """Watch a policy in an env, in a window or as a video."""
 
-    env: EnvId
+    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+    """Id of the env, such as BigAnt; or the file of a policy, which is shown in the env that it was
+    trained in."""
     policy: Path | None = None
     """A policy that `train`, a study or `policies export` has written, or `reference` for the one
     that ships for the env; random actions if not given. A policy for another body acts through the
@@ -108,8 +107,17 @@ class Play(Watching):
     body: Body = ""
 
     def run(self) -> None:
-        ref = env_ref(self.env, self.body)
-        self.show(ref, self.policy and policy_file(self.policy, ref))
+        if Path(self.env).suffix not in POLICY_FILES:
+            ref = env_ref(self.env, self.body)
+            self.show(ref, self.policy and policy_file(self.policy, ref))
+            return
+        if self.policy is not None:
+            raise StudyError(
+                f"{self.env} is a policy: give an env with --policy, or only the file."
+            )
+        file = Path(self.env)
+        ref = _env_of(file, self.learner, "", self.body)
+        self.show(ref, file, trained_in=not self.body)
 
 
 def acting_in(
@@ -120,7 +128,8 @@ def acting_in(
     card: PolicyCard = policy.card
     if trained_in is not None and ENV in card.identity:
         remedy = (
-            "Train it again, or give --env to try the policy in the present version of the env."
+            "Train it again, or name the env, to try the policy in its present version: --env ENV, "
+            "or `shapechanger play ENV --policy FILE`."
         )
         now = identify_env(env, trained_in.id)
         require_same_env(card.identity, trained_in, now, file, remedy)
@@ -171,46 +180,69 @@ class _InEnv(_OfPolicy):
 
     def ref(self) -> EnvRef:
         """Return the env that the user named, or else the one that the policy was trained in."""
-        if self.env:
-            return driven(env_ref(self.env, self.body))
-        env = load_any_policy(self.file, self.learner).card.env
-        if env is None:
-            raise StudyError(f"{self.file} was trained on recordings that name no env: give --env.")
-        # A policy for many bodies is shown in the family's default body.
-        trained_in = env.without("bodies")
-        # The env, or its task, may come from a module of the user.
-        allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
-        if self.body and "path" in trained_in.kwargs:
-            return driven(trained_in.having({"body": self.body}))
-        return driven(env_ref(trained_in.id, self.body) if self.body else trained_in)
+        return _env_of(self.file, self.learner, self.env, self.body)
 
 
-@dataclass(frozen=True, kw_only=True)
-class PoliciesShow(_OfPolicy):
-    """Print a policy's origin, observation and action."""
+def _env_of(file: Path, learner: str, env_id: str, body: str) -> EnvRef:
+    """Return the env that the user named, or else the one that a policy was trained in."""
+    if env_id:
+        return driven(env_ref(env_id, body))
+    env = load_any_policy(file, learner).card.env
+    if env is None:
+        raise StudyError(
+            f"{file} was trained on recordings that name no env: `shapechanger play ENV --policy "
+            f"{file}` shows it in one, and other commands have --env."
+        )
+    # A policy for many bodies is shown in the family's default body.
+    trained_in = env.without("bodies")
+    # The env, or its task, may come from a module of the user.
+    allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
+    if body and "path" in trained_in.kwargs:
+        return driven(trained_in.having({"body": body}))
+    return driven(env_ref(trained_in.id, body) if body else trained_in)
+
+
+@dataclass(frozen=True)
+class PoliciesShow:
+    """Show the origin and the layouts of a policy, or list the policies in a folder."""
+
+    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")] = Path("results")
+    """A policy, a clone, or a folder, which is searched with its subfolders."""
+    references: bool = False
+    """List the shipped policies instead, one for each env."""
+    learner: OwnLearner = ""
 
     def run(self) -> None:
-        policy = load_any_policy(self.file, self.learner)
-        card: PolicyCard = policy.card
-        lines = {**origin_of(card), "command": card.command or "not in this file"}
-        if explored := card.start_log_std:
-            low, high = math.exp(min(explored)), math.exp(max(explored))
-            lines["explored"] = f"standard deviations of {low:.2f} to {high:.2f} at the start"
-        if hasattr(policy, "normalisation"):
-            lines["normalised"] = "no" if policy.normalisation is None else "yes"
-        if card.clone is not None:
-            lines["image"] = card.clone.eyes
-        lines["observation"] = ", ".join(card.observation.names) if card.observation else "none"
-        lines["action"] = ", ".join(card.action.names if card.action else STEERING)
-        for part, identity in card.identity.items():
-            made_of = {"model": identity.model, **identity.files}
-            shown = ", ".join(f"{name} {digest}" for name, digest in made_of.items() if digest)
-            lines[f"{part} digest"] = shown
-        for name, text in lines.items():
-            say(f"{name:12} {text}")
-        if card.settings is not None:
-            for name, value in msgspec.structs.asdict(card.settings).items():
-                say(f"  {name:16} {value}")
+        if self.references:
+            _print_references()
+        elif self.path.suffix in POLICY_FILES:
+            _show(self.path, self.learner)
+        else:
+            _list(self.path)
+
+
+def _show(file: Path, learner: str) -> None:
+    policy = load_any_policy(file, learner)
+    card: PolicyCard = policy.card
+    lines = {**origin_of(card), "command": card.command or "not in this file"}
+    if explored := card.start_log_std:
+        low, high = math.exp(min(explored)), math.exp(max(explored))
+        lines["explored"] = f"standard deviations of {low:.2f} to {high:.2f} at the start"
+    if hasattr(policy, "normalisation"):
+        lines["normalised"] = "no" if policy.normalisation is None else "yes"
+    if card.clone is not None:
+        lines["image"] = card.clone.eyes
+    lines["observation"] = ", ".join(card.observation.names) if card.observation else "none"
+    lines["action"] = ", ".join(card.action.names if card.action else STEERING)
+    for part, identity in card.identity.items():
+        made_of = {"model": identity.model, **identity.files}
+        shown = ", ".join(f"{name} {digest}" for name, digest in made_of.items() if digest)
+        lines[f"{part} digest"] = shown
+    for name, text in lines.items():
+        say(f"{name:12} {text}")
+    if card.settings is not None:
+        for name, value in msgspec.structs.asdict(card.settings).items():
+            say(f"  {name:16} {value}")
 
 
 def origin_of(card: PolicyCard) -> dict[str, str]:
@@ -224,34 +256,22 @@ def origin_of(card: PolicyCard) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True)
-class PoliciesList:
-    """List the policies in a folder and its subfolders."""
-
-    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")] = Path("results")
-    """The folder."""
-    references: bool = False
-    """List the shipped policies instead, one for each env."""
-
-    def run(self) -> None:
-        if self.references:
-            _print_references()
-            return
-        table = Table("file", "env", "learner", "steps", "seed", box=None)
-        for path in sorted(self.folder.rglob("*.safetensors")):
-            name = str(path.relative_to(self.folder))
-            try:
-                lines = origin_of(load_any_policy(path).card)
-            except ShapechangerError as error:
-                table.add_row(name, str(error))
-                continue
-            table.add_row(name, *(lines[each] for each in ("env", "learner", "steps", "seed")))
-        if not table.rows:
-            raise StudyError(
-                f"There is no policy in {self.folder}: train one, name another folder, or give "
-                "--references for the shipped policies."
-            )
-        print_table(table)
+def _list(folder: Path) -> None:
+    table = Table("file", "env", "learner", "steps", "seed", box=None)
+    for path in sorted(folder.rglob("*.safetensors")):
+        name = str(path.relative_to(folder))
+        try:
+            lines = origin_of(load_any_policy(path).card)
+        except ShapechangerError as error:
+            table.add_row(name, str(error))
+            continue
+        table.add_row(name, *(lines[each] for each in ("env", "learner", "steps", "seed")))
+    if not table.rows:
+        raise StudyError(
+            f"There is no policy in {folder}: train one, name another folder, or give --references "
+            "for the shipped policies."
+        )
+    print_table(table)
 
 
 def _print_references() -> None:
@@ -288,14 +308,6 @@ class PoliciesEvaluate(_InEnv):
             if found.standing is not None:
                 say(f"{'standing':14} {found.standing:.1%} of the steps")
             say(f"{'length':14} {found.mean_length:.4g} steps")
-
-
-@dataclass(frozen=True, kw_only=True)
-class PoliciesPlay(_InEnv, Watching):
-    """Watch a policy in the env that it was trained in, in a window or as a video."""
-
-    def run(self) -> None:
-        self.show(self.ref(), self.file, trained_in=not (self.env or self.body))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -371,71 +383,3 @@ class PoliciesConvert:
             layouts, identity = layouts_of(made), known({ENV: identify_env(made, env.id)})
         convert_zip(self.file, env, layouts, identity, command_line()).save(self.out)
         say(f"wrote {self.out}")
-
-
-@dataclass(frozen=True)
-class PoliciesPush:
-    """Upload a policy to the Hugging Face Hub, with a card that describes it."""
-
-    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A policy, or a clone."""
-    repo: RepoName
-    """Name of the repository, such as ada/ant; it is made if it does not exist."""
-    public: Public = False
-
-    def run(self) -> None:
-        card = _policy_card(self.file, self.repo)
-        with tempfile.TemporaryDirectory() as folder:
-            (Path(folder) / hub.POLICY).symlink_to(self.file.resolve())
-            address = hub.push(Path(folder), card, self.repo, "policy", public=self.public)
-        say(f"pushed {self.file} to {address}")
-
-
-@dataclass(frozen=True)
-class PoliciesPull:
-    """Download a policy from the Hugging Face Hub; nothing else of the repository is read."""
-
-    repo: RepoName
-    """Name of a repository that `policies push` has filled, such as ada/ant."""
-    out: Path
-    """The file to write, such as ant.safetensors; it must not exist yet."""
-    revision: Revision = ""
-
-    def run(self) -> None:
-        if self.out.exists():
-            raise HubError(f"{self.out} exists already: choose another name, or move it away.")
-        # After Ctrl-C, a download may still write while the folder is removed.
-        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            commit = hub.pull(
-                self.repo, "policy", Path(folder), revision=self.revision, max_bytes=MAX_BYTES
-            )
-            path = Path(folder) / hub.POLICY
-            try:
-                env = origin_of(load_policy(path).card)["env"]
-            except PolicyError as error:
-                raise HubError(
-                    str(error).replace(str(path), f"{path.name} of {self.repo}")
-                ) from error
-            require_file(self.out)
-            write_atomic(self.out, path.read_bytes())
-        say(f"wrote {self.out}: {env}, revision {commit}")
-
-
-def _policy_card(file: Path, repo: str) -> str:
-    card = load_policy(file).card
-    rows: dict[str, object] = {**origin_of(card), "SHA-256": hub.sha256_of(file)}
-    seen = "" if card.clone is None else f"image ({card.clone.eyes})"
-    done = ", ".join(STEERING)
-    return hub.readme(
-        repo,
-        ["reinforcement-learning"],
-        f"A policy of Shapechanger for `{rows['env']}`.",
-        rows,
-        {
-            "Observation": hub.features_text(card.observation, seen),
-            "Action": hub.features_text(card.action, done),
-        },
-        card.command,
-        f"shapechanger policies pull {repo} --out policy.safetensors\n"
-        "shapechanger policies play policy.safetensors",
-    )

@@ -27,9 +27,11 @@ from shapechanger.envs.suite_file import (
 )
 from shapechanger.errors import FailedRuns, RenderError, StudyError, check_seed, require_known
 from shapechanger.files import read_json, write_atomic, write_json
+from shapechanger.registry import METHODS
 from shapechanger.reports.numbers import interval_text
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import resolve_learner
+from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.plan import (
     PLAN_FILE,
     SOURCE,
@@ -186,7 +188,7 @@ class SuiteMerge:
 
 @dataclass(frozen=True)
 class SuiteList:
-    """List the suites that come with Shapechanger."""
+    """List the suites that come with Shapechanger, and the methods that a study can compare."""
 
     def run(self) -> None:
         table = Table("suite", "studies", "seeds", "arms", box=None)
@@ -194,6 +196,13 @@ class SuiteList:
             suite = load_suite(name)
             studies = str(len(suite_tasks(suite)))
             table.add_row(name, studies, str(suite.seeds), ", ".join(suite.arms) or "the default")
+        print_table(table)
+        say("")
+        table = Table("method", "what it does", "source", box=None)
+        for name in METHODS.names():
+            method = load_method(name)
+            about = (type(method).__doc__ or "").strip().partition("\n")[0]
+            table.add_row(name, about, method.paper)
         print_table(table)
 
 

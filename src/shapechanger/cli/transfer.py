@@ -1,4 +1,4 @@
-"""`shapechanger transfer | methods`: run a transfer study, and list transfer methods."""
+"""`shapechanger transfer`: run a transfer study."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ from shapechanger.cli.env_arguments import Learner, Settings, TwoEnvs, policy_fi
 from shapechanger.envs.catalogue import allow_own_modules, default_learner, short_name
 from shapechanger.errors import MapError, OutputError, StudyError, check_seed
 from shapechanger.files import read_text
-from shapechanger.registry import METHODS
 from shapechanger.transfer.executor import Executor, Processes
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.settings import study_budgets
-from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 from shapechanger.transfer.report.study import write_study_report
 from shapechanger.transfer.report.verdict import measure_rows, other_arms, verdict, weak_individuals
@@ -103,8 +101,8 @@ class Transfer(TwoEnvs, StudyRuns):
     learner: Learner = ""
     set: Settings = ()
     arms: tuple[str, ...] = ()
-    """Methods to compare; scratch is required. `shapechanger methods` lists them; module:name is a
-    method that your module registers. The default is scratch, zero-shot and fine-tune, and if the
+    """Methods to compare, as `shapechanger suite list` lists them; scratch is required. module:name
+    is a method that your module registers. The default is scratch, zero-shot and fine-tune; if the
     target is the same task in another finger, also randomised and identified."""
     rule: tuple[str, ...] = ()
     """Rules of the body map for entries without a partner, as NAME=RULE: "foot_*/motor=learn",
@@ -178,19 +176,6 @@ class Transfer(TwoEnvs, StudyRuns):
         _print(study)
         report = write_study_report(study, out)
         say(f"\nwrote {out / 'study.json'} and {report}")
-
-
-@dataclass(frozen=True)
-class Methods:
-    """List the transfer methods that a study can compare."""
-
-    def run(self) -> None:
-        table = Table("method", "what it does", "source", box=None)
-        for name in METHODS.names():
-            method = load_method(name)
-            about = (type(method).__doc__ or "").strip().partition("\n")[0]
-            table.add_row(name, about, method.paper)
-        print_table(table)
 
 
 def _split_rule(text: str) -> tuple[str, str]:

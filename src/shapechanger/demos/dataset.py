@@ -205,7 +205,7 @@ def _part(
         if (apart < 0.0).any():
             raise DemosError(
                 f"Time runs backwards in {name} after step {indices[apart.argmin()]}: exclude "
-                "steps with `shapechanger demos bad`."
+                "steps with `shapechanger demos edit bad`."
             )
         periods_s = apart[np.diff(indices) == 1].tolist()
     layout = header.state_layout or None

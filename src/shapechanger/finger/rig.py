@@ -85,7 +85,7 @@ class RigSenses:
         return (
             f"The lengths of the tendons fit no posture of a finger; {TENDONS[worst]} is off "
             f"by {1e3 * abs(longer[worst]):.0f} mm. Servos lose count of their turns without "
-            "power: find the zeros with `shapechanger robot home`."
+            "power: find the zeros with `shapechanger robot calibrate --zeros`."
         )
 
     def length_values(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:

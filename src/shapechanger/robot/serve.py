@@ -197,7 +197,7 @@ def store(robot: KnownRobot) -> str:
     if (known.key, known.fingerprint) != (robot.key, robot.fingerprint):
         return (
             f"Another robot is known here as {name}, at {known.address}, and stays known: "
-            f"`shapechanger robot forget {name}` makes room for this one."
+            f"`shapechanger robot find --forget {name}` makes room for this one."
         )
     before, now = parse_address(known.address), parse_address(robot.address)
     if before != now and not is_loopback(before.host):

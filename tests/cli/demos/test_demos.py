@@ -61,7 +61,7 @@ def test_list(data: Path, demos: Cli) -> None:
     first, second = episodes(data)
     with (second / "steps.jsonl").open("ab") as file:
         file.write(b"torn")
-    printed = demos.output("list", data)
+    printed = demos.output("show", data)
     line = next(line for line in printed.splitlines() if first.name in line)
     assert "Car-v1" in line
     assert "policy 67 %, expert 33 %" in line
@@ -82,7 +82,7 @@ def test_show_as_text(data: Path, demos: Cli) -> None:
 
 def test_show_as_a_page(data: Path, tmp_path: Path, demos: Cli) -> None:
     first, second = episodes(data)
-    demos.output("bad", first, "--from", 10, "--to", 19)
+    demos.output("edit", "bad", first, "--from", 10, "--to", 19)
     damaged = second / "frames" / "000003.jpg"
     damaged.write_bytes(bytes(len(damaged.read_bytes())))
     page = tmp_path / "deep" / "page.html"
@@ -100,13 +100,13 @@ def test_show_as_a_page(data: Path, tmp_path: Path, demos: Cli) -> None:
 
 def test_cut_bad_good_mark(data: Path, demos: Cli) -> None:
     first, _ = episodes(data)
-    assert "11 of 30 steps" in demos.output("cut", first, "--from", 5, "--to", 15)
+    assert "11 of 30 steps" in demos.output("edit", "cut", first, "--from", 5, "--to", 15)
     assert [s.index for s in read_episode(first).kept] == list(range(5, 16))
-    assert "8 of 30 steps" in demos.output("bad", first, "--from", 7, "--to", 9)
-    assert "10 of 30 steps" in demos.output("good", first, "--from", 8, "--to", 9)
-    assert "0 of 30 steps" in demos.output("bad", first)
-    assert "30 of 30 steps" in demos.output("good", first)
-    demos.output("mark", first, 4, "a stone")
+    assert "8 of 30 steps" in demos.output("edit", "bad", first, "--from", 7, "--to", 9)
+    assert "10 of 30 steps" in demos.output("edit", "good", first, "--from", 8, "--to", 9)
+    assert "0 of 30 steps" in demos.output("edit", "bad", first)
+    assert "30 of 30 steps" in demos.output("edit", "good", first)
+    demos.output("edit", "mark", first, "--from", 4, "--text", "a stone")
     assert [(mark.step, mark.text) for mark in read_episode(first).marks][1:] == [(4, "a stone")]
 
 
@@ -135,30 +135,34 @@ def test_repair(data: Path, demos: Cli) -> None:
 
 def test_one_episode_must_be_named(data: Path, demos: Cli) -> None:
     first, second = episodes(data)
-    assert f"has 2 episodes: name one of them, such as {first}" in demos.refused("bad", data)
+    assert f"has 2 episodes: name one of them, such as {first}" in demos.refused(
+        "edit", "bad", data
+    )
     near = data / f"{second.name[:-1]}9"
-    assert f"Did you mean {second.name!r}" in demos.refused("cut", near)
-    sentence = demos.refused("cut", first, "--from", 20, "--to", 40)
+    assert f"Did you mean {second.name!r}" in demos.refused("edit", "cut", near)
+    sentence = demos.refused("edit", "cut", first, "--from", 20, "--to", 40)
     assert "has the steps 0 to 29, and not 20 to 40" in sentence
-    assert "and not 50 to 50" in demos.refused("mark", first, 50)
-    assert "There is no recording" in demos.refused("list", data / "no" / "such")
+    assert "and not 50 to 50" in demos.refused("edit", "mark", first, "--from", 50)
+    assert "without --to" in demos.refused("edit", "mark", first)
+    assert "--text is for mark" in demos.refused("edit", "bad", first, "--text", "x")
+    assert "There is no recording" in demos.refused("show", data / "no" / "such")
     shutil.rmtree(second)
-    assert "0 of 30 steps" in demos.output("bad", data)
+    assert "0 of 30 steps" in demos.output("edit", "bad", data)
 
 
 def test_replay_needs_one_target(data: Path, demos: Cli) -> None:
     """`replay` needs exactly one of --film, --env and --robot, and an episode with kept steps."""
     first, _ = episodes(data)
     assert "one of --film, --env and --robot" in demos.refused("replay", first)
-    demos.output("bad", first)
-    assert "demos good" in demos.refused("replay", first, "--film", "a.mp4")
+    demos.output("edit", "bad", first)
+    assert "demos edit good" in demos.refused("replay", first, "--film", "a.mp4")
 
 
 def test_a_film(data: Path, tmp_path: Path, demos: Cli) -> None:
     import imageio_ffmpeg
 
     first, _ = episodes(data)
-    demos.output("cut", first, "--to", 19)
+    demos.output("edit", "cut", first, "--to", 19)
     assert "20 steps, 1.0 s" in demos.output("replay", first, "--film", tmp_path / "a.mp4")
     assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "a.mp4")) == (20, 1.0)
     assert "a film ends with one of" in demos.refused("replay", first, "--film", tmp_path / "a.txt")

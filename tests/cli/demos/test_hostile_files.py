@@ -172,7 +172,7 @@ PICTURES: Spoilt = {
 }
 
 
-@pytest.mark.parametrize("command", ["list", "merge", "import", "export", "train", "repair"])
+@pytest.mark.parametrize("command", ["show", "merge", "import", "export", "train", "repair"])
 def test_a_file_instead_of_a_folder_is_refused(tmp_path: Path, jail: Jail, command: str) -> None:
     """An archive is not unpacked; a pickle, an HDF5 file or a pipe is not opened."""
     options = {
@@ -386,4 +386,4 @@ def test_a_hostile_recording_is_refused(
     name, option, out, *more = command
     assert words in refuse(jail(name, folder, option, tmp_path / out, *more))
     assert not (tmp_path / out).exists()
-    assert "Traceback" not in jail("list", folder)[1]
+    assert "Traceback" not in jail("show", folder)[1]

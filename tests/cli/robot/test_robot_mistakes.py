@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli.robot.check import ask_person
+from shapechanger.robot import safe_pins
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.discovery import FoundRobot
 from shapechanger.robot.link.address import Address
@@ -103,8 +104,8 @@ MISTAKES = (
     ("check test-car.toml --leds --wheels-up", "--wheels-up cannot be combined with --twin"),
     ("check test-car.toml --wheels-up --jumper 20 20", "A jumper joins two pins"),
     ("install car", "`shapechanger robot init car` writes your own"),
-    ("home finger", "`shapechanger robot init finger` writes your own"),
-    ("home test-car.toml --straight", "no tendons on a servo bus"),
+    ("calibrate finger --zeros", "`shapechanger robot init finger` writes your own"),
+    ("calibrate test-car.toml --zeros --straight", "no tendons on a servo bus"),
     ("calibrate test-car.toml", "lift its wheels"),
     ("calibrate car", "`shapechanger robot init car` writes your own"),
     ("calibrate test-car.toml --cap 2", "--cap must be above 0"),
@@ -202,10 +203,21 @@ def test_stopping_a_robot_that_is_off(robot: Cli, monkeypatch: pytest.MonkeyPatc
 
 
 @WITHOUT_PINS
-@pytest.mark.parametrize("command", ["serve", "safe-pins", "check --leds"])
+@pytest.mark.parametrize("command", ["serve", "check --leds"])
 def test_a_machine_without_pins(robot: Cli, home: Path, command: str) -> None:
     name, *options = command.split()
     assert "serve --twin" in robot.refused(name, write_ready_profile(home), *options)
+
+
+@WITHOUT_PINS
+def test_safe_pins_on_a_machine_without_pins(
+    home: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for arguments, message in (([write_ready_profile(home)], "serve --twin"), ([], "Give the")):
+        with pytest.raises(SystemExit) as ended:
+            safe_pins.main(arguments)
+        assert ended.value.code == 2
+        assert message in capsys.readouterr().err
 
 
 def test_a_full_disk_leaves_no_partial_robot(

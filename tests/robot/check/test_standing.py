@@ -87,7 +87,9 @@ def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path, car: Profile) 
     assert "I2C speed" not in found
 
 
-_EXECUTES = "Restart={}\nExecStart=/x robot serve {}\nExecStopPost=robot safe-pins {}\n"
+_EXECUTES = (
+    "Restart={}\nExecStart=/x robot serve {}\nExecStopPost=x shapechanger.robot.safe_pins {}\n"
+)
 
 
 @pytest.mark.parametrize(

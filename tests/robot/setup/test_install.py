@@ -91,7 +91,7 @@ def test_the_service_is_removed(pi: FakePi) -> None:
     assert found["group gpio"] == ("would", "sudo usermod -aG gpio pi")
     assert (pi.ran, found["picamera2"][0]) == ([], "already")
     assert _install(pi, _blind("car"))["service"][0] == "did"
-    assert "safe-pins" in (pi.root / _UNIT).read_text()
+    assert "shapechanger.robot.safe_pins" in (pi.root / _UNIT).read_text()
     for level in ("did", "already"):
         changes = changes_to_remove("shapechanger-car.service", pi.root)
         assert [made for _, made, _ in make_changes(changes, pi.run)] == [level]

@@ -127,7 +127,9 @@ class DemosReplay:
             raise DemosError("Give exactly one of --film, --env and --robot.")
         episode = episode_at(self.episode)
         if not episode.kept:
-            raise DemosError(f"All steps of {episode.path} are dropped: use `demos good` first.")
+            raise DemosError(
+                f"All steps of {episode.path} are dropped: use `demos edit good` first."
+            )
 
         if self.film is not None:
             say(write_episode_film(episode, self.film))

@@ -8,7 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -24,9 +24,12 @@ from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.client.teleop import STOPS, Terminal
 from shapechanger.robot.drivers.chip import OUTPUTS
+from shapechanger.robot.hardware import REAL, connect
 from shapechanger.robot.profile.load import load_profile, rewrite
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.calibration import (
+    find_joint_zeros,
+    find_zeros,
     motor_changes,
     pulse_changes,
     reading,
@@ -41,7 +44,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RobotCalibrate:
-    """Calibrate servo ends and centres, motor directions and wheel circumferences."""
+    """Calibrate servo ends, motor directions, wheel circumferences, or the zeros of a rig."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile; the results are written into it, and its comments are kept."""
@@ -52,8 +55,19 @@ class RobotCalibrate:
     larger values."""
     wheels_up: bool = False
     """Without --twin: confirm that the wheels are off the ground, instead of being asked."""
+    zeros: bool = False
+    """For a rig of tendons: find the zeros of its tendons and joints instead, while a person holds
+    the finger straight. The rig must not be served meanwhile. Repeat it whenever the servos were
+    without power; encoders at the joints keep their zeros."""
+    straight: bool = False
+    """With --zeros: confirm that a person already holds the finger straight."""
 
     def run(self) -> None:
+        if self.zeros:
+            self._find_zeros()
+            return
+        if self.straight:
+            raise RobotError("--straight is for --zeros: give both.")
         if not 0.0 < self.cap <= 1.0:
             raise RobotError(f"--cap must be above 0 and at most 1, got {self.cap}.")
         path = own_profile(self.profile)
@@ -77,7 +91,22 @@ class RobotCalibrate:
         calibration.found["robot.calibrated"] = datetime.date.today()
         change_profile(path, calibration.found)
 
+    def _find_zeros(self) -> None:
+        if self.twin or self.wheels_up:
+            raise RobotError("--zeros needs the rig itself: leave out --twin and --wheels-up.")
+        path = own_profile(self.profile)
+        plan = load_profile(path).guard_plan()
+        if not self.straight:
+            input("Hold the finger straight, and press Enter: all tendons then pull gently. ")
+        with closing(connect(REAL, "")) as hardware:
+            zeros = find_zeros(plan, hardware, lambda: time.sleep(_CYCLE_S))
+            joints = find_joint_zeros(plan, hardware, lambda: time.sleep(_CYCLE_S))
+        found = {f"output.{name}.zero": zero for name, zero in zeros.items()}
+        found |= {f"sensor.{name}.zero": zero for name, zero in joints.items()}
+        change_profile(path, found)
 
+
+_CYCLE_S: Final = 0.01  # Between two readings of a rig.
 # Change of a value at each key press, and in the search for the duty at which a motor starts.
 _STEP: Final = 0.02
 _START_STEP: Final = 0.05

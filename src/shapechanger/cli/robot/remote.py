@@ -1,4 +1,4 @@
-"""`shapechanger robot find | remember | forget | stop | fetch`: robots on the network."""
+"""`shapechanger robot find | remember | stop | fetch`: robots on the network."""
 
 from __future__ import annotations
 
@@ -29,19 +29,21 @@ RobotName = Annotated[
     tyro.conf.Positional,
     tyro.conf.arg(metavar="ROBOT", help="Name of a robot that `remember` has stored."),
 ]
-_LocalName = Annotated[
-    str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME", help="Local name of the robot.")
-]
 
 
 @dataclass(frozen=True)
 class RobotFind:
-    """List the robots on this network."""
+    """List the robots on this network, or remove a known one."""
 
     seconds: float = 2.0
     """Time to listen, s."""
+    forget: str = ""
+    """Local name of a known robot to remove, instead of listing."""
 
     def run(self) -> None:
+        if self.forget:
+            forget(self.forget)
+            return
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"--seconds must be above 0 and at most 60, got {self.seconds}.")
         known: dict[str, str] = {}
@@ -69,7 +71,8 @@ class RobotFind:
 class RobotRemember:
     """Store a robot's address and key under a name."""
 
-    name: _LocalName
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
+    """Local name of the robot."""
     address: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")]
     """Address, as HOST or HOST:PORT."""
     fingerprint: str
@@ -80,16 +83,6 @@ class RobotRemember:
         key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
         path = remember(KnownRobot(self.name, self.address, key.strip(), self.fingerprint))
         say(f"wrote {path}")
-
-
-@dataclass(frozen=True)
-class RobotForget:
-    """Remove a known robot."""
-
-    name: _LocalName
-
-    def run(self) -> None:
-        forget(self.name)
 
 
 def _asked_key(name: str) -> str:

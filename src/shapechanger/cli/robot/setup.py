@@ -1,12 +1,11 @@
-"""`shapechanger robot init | install | key | home | safe-pins`: set up a robot."""
+"""`shapechanger robot init | install | key`: set up a robot."""
 
 from __future__ import annotations
 
 import getpass
 import socket
 import sys
-import time
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -17,7 +16,6 @@ from rich.prompt import Prompt
 
 from shapechanger.cli.console import plain_console, say
 from shapechanger.errors import MissingExtra, RobotError, UnknownName
-from shapechanger.robot.check.pins import require_pins
 from shapechanger.robot.client.known_robots import check_name, console_address, remember
 from shapechanger.robot.daemon.credentials import (
     Credentials,
@@ -25,8 +23,6 @@ from shapechanger.robot.daemon.credentials import (
     load_credentials,
     make_credentials,
 )
-from shapechanger.robot.guard.outputs import make_safe
-from shapechanger.robot.hardware import REAL, connect
 from shapechanger.robot.link.authentication import fingerprint_short
 from shapechanger.robot.profile.load import (
     find_profile,
@@ -39,7 +35,6 @@ from shapechanger.robot.profile.load import (
 )
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import robot_at
-from shapechanger.robot.setup.calibration import find_joint_zeros, find_zeros
 from shapechanger.robot.setup.install import (
     Machine,
     changes_to_install,
@@ -222,33 +217,6 @@ def change_profile(path: Path, changes: dict[str, Any]) -> None:
     say(f"wrote {path}")
 
 
-_CYCLE_S: Final = 0.01
-
-
-@dataclass(frozen=True)
-class RobotHome:
-    """Find the zeros of a rig's tendons and joints while a person holds the finger straight."""
-
-    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
-    """The rig's profile; the zeros are written into it, and its comments are kept. The rig must not
-    be served meanwhile. Repeat the command whenever the servos were without power; encoders at the
-    joints keep their zeros."""
-    straight: bool = False
-    """Confirm that a person already holds the finger straight, instead of being asked."""
-
-    def run(self) -> None:
-        path = own_profile(self.profile)
-        plan = load_profile(path).guard_plan()
-        if not self.straight:
-            input("All tendons pull gently. Hold the finger straight, and press Enter. ")
-        with closing(connect(REAL, "")) as hardware:
-            zeros = find_zeros(plan, hardware, lambda: time.sleep(_CYCLE_S))
-            joints = find_joint_zeros(plan, hardware, lambda: time.sleep(_CYCLE_S))
-        found = {f"output.{name}.zero": zero for name, zero in zeros.items()}
-        found |= {f"sensor.{name}.zero": zero for name, zero in joints.items()}
-        change_profile(path, found)
-
-
 @dataclass(frozen=True)
 class RobotInstall:
     """Install a robot's service, and set up its groups, buses and camera, on a Raspberry Pi."""
@@ -321,22 +289,3 @@ def require_port(port: int) -> None:
     """Refuse a number that is not a TCP port; 0 selects any free port."""
     if not 0 <= port <= _LAST_PORT:
         raise RobotError(f"A port must be 0 (any free port) to {_LAST_PORT}, got {port}.")
-
-
-@dataclass(frozen=True)
-class RobotSafePins:
-    """Put every output of a robot at rest after a crash, as systemd's ExecStopPost."""
-
-    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
-    """The robot's profile."""
-
-    def run(self) -> None:
-        plan = load_profile(find_profile(self.profile)).guard_plan()
-        require_pins(plan)
-        with closing(connect(REAL, "")) as hardware:
-            failures = make_safe(plan, hardware)
-        if failures:
-            raise RobotError(
-                "Not all outputs are at rest: disconnect the battery. " + " ".join(failures)
-            )
-        say(f"All {len(plan.outputs)} outputs of {plan.name} are at rest.")

@@ -171,7 +171,7 @@ def _unit(robot: StandingRobot) -> Results:
     needed = [
         "Restart=always",
         f"ExecStart=…robot serve {word}",
-        f"ExecStopPost=…robot safe-pins {word}",
+        f"ExecStopPost=…shapechanger.robot.safe_pins {word}",
     ]
     text = path.read_text() if path.exists() else ""
     patterns = {one: re.escape(one).replace("…", ".*") for one in needed}

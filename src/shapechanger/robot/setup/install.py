@@ -98,6 +98,7 @@ def write_unit(
         "UNIT": path.stem,
         "ROBOT": path.stem.removeprefix("shapechanger-"),
         "PROFILE": unit_word(str(profile.absolute())),
+        "PYTHON": unit_word(sys.executable),
         "PROGRAM": unit_word(shutil.which("shapechanger") or f"{sys.prefix}/bin/shapechanger"),
         "USER": user or getpass.getuser(),
         "OPTIONS": options,

@@ -110,7 +110,7 @@ class ServoBus:
         if lost := [one.settings.name for one in self.servos.values() if one.zero is None]:
             raise RobotError(
                 f"{', '.join(lost)} lost the power, and so the zero of its tendon: find the zeros "
-                "with `shapechanger robot home`, and serve the robot afresh."
+                "with `shapechanger robot calibrate --zeros`, and serve the robot afresh."
             )
 
     def flush(self, *, grip: bool) -> None:
