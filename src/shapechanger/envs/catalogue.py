@@ -80,8 +80,16 @@ def _body(name: str, family: str, summary: str) -> CatalogueEntry:
     entry_point, learner, threshold = _FAMILIES[family]
     if name == "ExtendedAnt":  # Its spaces are larger, so its class has a page of its own.
         entry_point = "ant:ExtendedAntEnv"
-    place = f"envs.{entry_point}"
-    return CatalogueEntry(name, summary, place, learner, family, threshold, kwargs={"body": name})
+    return CatalogueEntry(
+        name,
+        summary,
+        f"envs.{entry_point}",
+        learner,
+        family,
+        threshold,
+        device=f"shapechanger.envs.{entry_point.partition(':')[0]}_gpu",
+        kwargs={"body": name},
+    )
 
 
 CATALOGUE: Final = _by_id(
@@ -198,6 +206,8 @@ _REMOTE: Final = _by_id(
         )
     )
 )
+ON_DEVICE: Final = (*CATALOGUE.values(), *FINGER_ENVS.values())
+"""Envs with batched functions for a device, except ODRL's, whose bodies belong to CATALOGUE."""
 _DRIVES: Final = {**VEHICLE_ENVS, **RANGES_ENVS, **WAYPOINT_ENVS}
 # All envs but ODRL's.
 _NAMED: Final = {**CATALOGUE, OWN_ROBOT: _OWN, **_DRIVES, **FINGER_ENVS, **_REMOTE}

@@ -11,10 +11,10 @@ from typing import Any, Final
 import gymnasium as gym
 import mujoco
 
-from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS
+from shapechanger.envs.catalogue import ON_DEVICE
 from shapechanger.envs.checks import describe_body
 from shapechanger.envs.warp.kernels import follow_mujoco
-from shapechanger.envs.warp.tasks import TASKS, DeviceTask
+from shapechanger.envs.warp.tasks import DeviceTask
 from shapechanger.envs.warp.worlds import DeviceBody, Worlds, device_body, differing_arrays
 from shapechanger.errors import SpaceMismatch, VectorEnvError
 from shapechanger.morphology import Body
@@ -78,14 +78,17 @@ class BodyReader:
 
 # Makes the reader from a CPU env, a maker of CPU envs and their arguments.
 _MakeReader = Callable[[gym.Env[Any, Any], _Make, dict[str, Any]], BodyReader]
-_READERS: Final[dict[type, _MakeReader]] = {
-    env_class: partial(BodyReader, task) for env_class, task in TASKS.items()
-}
+_READERS: Final[dict[type, _MakeReader]] = {}
 
 
 def register_reader(env_class: type, reader: _MakeReader) -> None:
     """Register the reader for a class of envs; subclasses of this class do not use it."""
     _READERS[env_class] = reader
+
+
+def register_task(env_class: type, task: type[DeviceTask]) -> None:
+    """Register the batched functions of a class of envs whose bodies `BodyReader` compiles."""
+    register_reader(env_class, partial(BodyReader, task))
 
 
 def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyReader:
@@ -101,20 +104,14 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
     """
     follow_mujoco()
     first = make(arguments)
-    for module in {task.device for task in FINGER_ENVS.values()}:
+    for module in dict.fromkeys(entry.device for entry in ON_DEVICE):
         import_module(module)
     reader = _READERS.get(type(first.unwrapped))
     if reader is not None:
         return reader(first, make, arguments)
-    classes = {kind.__name__ for kind in TASKS}
-    known = [
-        entry.name
-        for entry in (*CATALOGUE.values(), *FINGER_ENVS.values())
-        if entry.device or entry.entry_point.rpartition(":")[2] in classes
-    ]
     raise VectorEnvError(
         f"{env_id} has no batched functions, which backend='warp' needs; these envs have them: "
-        f"{', '.join(known)}."
+        f"{', '.join(entry.name for entry in ON_DEVICE)}."
     )
 
 

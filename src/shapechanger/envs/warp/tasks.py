@@ -1,13 +1,12 @@
-"""Tasks as functions of the state of many worlds, with the constants of their CPU envs.
+"""What the tasks of many worlds share: their constants, and starts that follow `StartRules`.
 
-If the reward formula of a CPU env does not read a simulation, it is called with tensors. Every
-weight and range is read from a CPU env.
+The functions of each body are next to its env, such as `envs.ant_gpu`. If the reward formula of a
+CPU env does not read a simulation, they call it with tensors; every weight and range is read from a
+CPU env.
 """
 
 from __future__ import annotations
 
-from functools import partial
-from types import SimpleNamespace
 from typing import Any, ClassVar, Final
 
 import mujoco
@@ -17,21 +16,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 from typing_extensions import override
 
-from shapechanger.envs.ant import AntEnv, ExtendedAntEnv, is_upright
-from shapechanger.envs.pendulum import (
-    CLIPPED_AT,
-    FALLEN_M,
-    FALLEN_RAD,
-    InvertedDoublePendulumEnv,
-    InvertedPendulumEnv,
-)
-from shapechanger.envs.runners import (
-    HalfCheetahEnv,
-    HopperEnv,
-    HumanoidEnv,
-    SwimmerEnv,
-    Walker2dEnv,
-)
 from shapechanger.envs.warp.kernels import uniforms
 from shapechanger.envs.warp.worlds import Infos, Worlds, geom_type
 from shapechanger.errors import VectorEnvError
@@ -44,8 +28,8 @@ _QUATERNION_AT: Final = {int(mujoco.mjtJoint.mjJNT_FREE): 3, int(mujoco.mjtJoint
 _POSITIONS: Final = 0
 _VELOCITIES: Final = 1
 
-# Rewards, terminations and infos.
-_Outcome = tuple[Tensor, Tensor, Infos]
+Outcome = tuple[Tensor, Tensor, Infos]
+"""Rewards, terminations and infos."""
 
 
 class DeviceTask(Worlds):
@@ -164,220 +148,11 @@ def _reach(shape: str, size: Tensor, towards: Tensor) -> Tensor:
     return (size * towards.abs()).sum(dim=-1)
 
 
-def _cost(weight: float, numbers: Tensor) -> Tensor:
+def cost(weight: float, numbers: Tensor) -> Tensor:
+    """Return a weighted sum of squares over all but the first axis, shape (n,)."""
     return weight * numbers.square().flatten(1).sum(dim=1)
 
 
-class DeviceAnt(DeviceTask):
-    """Ants of any body."""
-
-    normal_velocities = True
-    contact_forces = True
-    place_size = 2
-
-    @override
-    def place(self) -> Tensor:
-        return self.xpos[:, int(self.model.body(self._env.main_body).id), :2]
-
-    def _forces(self) -> Tensor:
-        return self.cfrc_ext.clamp(*self._env._contact_force_range)
-
-    @override
-    def observations(self) -> Tensor:
-        parts = [self.qpos[:, 2 if self._env.place_hidden else 0 :], self.qvel]
-        if self._env.contacts_observed:
-            parts.append(self._forces()[:, 1:].flatten(1))
-        return torch.cat(parts, dim=1)
-
-    @override
-    def outcome(self, before: Tensor, actions: Tensor) -> _Outcome:
-        env, qpos, constants = self._env, self.qpos, self.constants
-        velocity = (self.place() - before) / constants["dt"][:, None]
-        limits = constants["low"], constants["high"]
-        healthy = is_upright(qpos[:, 2], qpos[:, 4], qpos[:, 5], *limits)
-        healthy &= qpos.isfinite().all(dim=1) & self.qvel.isfinite().all(dim=1)
-        effort = _cost(env._ctrl_cost_weight, actions)
-        contact = _cost(env._contact_cost_weight, self._forces())
-        place = self.start_infos().values()
-        rewards, infos = env._reward(place, velocity.T, effort, contact, healthy)
-        return rewards, ~healthy & bool(env._terminate_when_unhealthy), infos
-
-
-class DevicePendulum(DeviceTask):
-    """Inverted pendulums of any length."""
-
-    @override
-    def observations(self) -> Tensor:
-        return torch.cat([self.qpos, self.qvel], dim=1)
-
-    @override
-    def outcome(self, before: Tensor, actions: Tensor) -> _Outcome:
-        finite = self.observations().isfinite().all(dim=1)
-        up = finite & (self.qpos[:, 1].abs() <= FALLEN_RAD)
-        rewards = up.to(self.qpos.dtype)
-        return rewards, ~up, {"reward_survive": rewards.clone()}
-
-
-class DeviceDoublePendulum(DeviceTask):
-    """Inverted double pendulums of any length."""
-
-    normal_velocities = True
-    start_forces = True
-
-    @override
-    @staticmethod
-    def constants_of(env: Any) -> dict[str, NDArray[Any]]:
-        found = DeviceTask.constants_of(env)
-        for name in ("foot_m", "length_m", "plain_foot_m", "plain_length_m"):
-            found[name] = np.array(getattr(env, f"_{name}"))
-        return found
-
-    @override
-    def observations(self) -> Tensor:
-        qpos, clip = self.qpos, (-CLIPPED_AT, CLIPPED_AT)
-        hinges = qpos[:, 1:]
-        velocities, force = self.qvel.clamp(*clip), self.qfrc_constraint[:, :1].clamp(*clip)
-        return torch.cat([qpos[:, :1], hinges.sin(), hinges.cos(), velocities, force], dim=1)
-
-    @override
-    def outcome(self, before: Tensor, actions: Tensor) -> _Outcome:
-        env, tip = self._env, self.site_xpos[:, 0]
-        constants = self.constants
-        part = tip[:, 2] - constants["foot_m"]
-        height = part * (constants["plain_length_m"] / constants["length_m"])
-        height = height + constants["plain_foot_m"]
-        fallen = ~(height > FALLEN_M)  # Also true if the height is not a number.
-        # Call Gymnasium's formula without the bonus, which depends on a condition.
-        there = SimpleNamespace(
-            data=SimpleNamespace(qvel=self.qvel.T), _healthy_reward=env._healthy_reward
-        )
-        rewards, infos = _base(env)._get_rew(there, tip[:, 0], height, True)
-        bonus = env._healthy_reward * (~fallen).to(height.dtype)
-        return rewards + bonus, fallen, {**infos, "reward_survive": bonus}
-
-
-class DeviceRunner(DeviceTask):
-    """Runners whose episodes never terminate."""
-
-    # Index of the trunk's height in `qpos`.
-    height_at: ClassVar[int] = 1
-
-    @override
-    def observations(self) -> Tensor:
-        env = self._env
-        hidden = env.place_size if env._place_hidden else 0
-        velocities = self.qvel.clamp(-env.velocity_limit, env.velocity_limit)
-        return torch.cat([self.qpos[:, hidden:], velocities], dim=1)
-
-    def _healthy(self) -> Tensor:
-        """Return whether each body is healthy, shape (n,): within its heights, if it has limits."""
-        height, constants = self.qpos[:, self.height_at], self.constants
-        if "low" not in constants:
-            return torch.ones_like(height, dtype=torch.bool)
-        return (constants["low"] < height) & (height < constants["high"])
-
-    def _contact_cost(self) -> Tensor | float:
-        """Return the cost of contact forces, shape (n,), or 0 for a task that has none."""
-        return 0.0
-
-    @override
-    def outcome(self, before: Tensor, actions: Tensor) -> _Outcome:
-        env = self._env
-        velocity = (self.place() - before) / self.constants["dt"][:, None]
-        healthy = self._healthy()
-        # Attributes of the env that Gymnasium's formula reads.
-        there = SimpleNamespace(
-            _forward_reward_weight=env._forward_reward_weight,
-            healthy_reward=healthy * getattr(env, "_healthy_reward", 0.0),
-            control_cost=partial(_cost, env._ctrl_cost_weight),
-            contact_cost=self._contact_cost(),
-        )
-        rewards, terms = _base(env)._get_rew(there, velocity[:, 0], actions)
-        speeds = {f"{axis}_velocity": speed for axis, speed in zip("xy", velocity.T, strict=False)}
-        ends = bool(getattr(env, "_terminate_when_unhealthy", False))
-        infos = {**self.start_infos(), **speeds, **terms}
-        return rewards, ~healthy & ends, infos
-
-
-class DeviceCheetah(DeviceRunner):
-    """Half cheetahs."""
-
-    normal_velocities = True
-
-
-class DeviceWalker(DeviceRunner):
-    """Walkers, which are healthy within ranges of height and lean."""
-
-    def _healthy(self) -> Tensor:
-        lean = self.qpos[:, 2]
-        low, high = self._env._healthy_angle_range
-        return super()._healthy() & (low < lean) & (lean < high)
-
-    @override
-    def start_infos(self) -> Infos:
-        risen = self.qpos[:, 1] - self.constants["init_qpos"][:, 1]
-        return {**super().start_infos(), "z_distance_from_origin": risen}
-
-
-class DeviceHopper(DeviceWalker):
-    """Hoppers, which are healthy within ranges of height, lean and state."""
-
-    def _healthy(self) -> Tensor:
-        low, high = self._env._healthy_state_range
-        state = torch.cat([self.qpos[:, 2:], self.qvel], dim=1)
-        within = ((low < state) & (state < high)).all(dim=1)
-        return super()._healthy() & within
-
-
-# Blocks of numbers that a humanoid observes, and how many first rows (world or trunk) are omitted.
-_BLOCKS: Final = {"cinert": 1, "cvel": 1, "qfrc_actuator": 6, "cfrc_ext": 1}
-
-
-class DeviceHumanoid(DeviceRunner):
-    """Humanoids, rewarded for the speed of the centre of mass and healthy within heights."""
-
-    height_at = 2
-    contact_forces = True
-    start_forces = True
-
-    @override
-    def place(self) -> Tensor:
-        mass = self.row("body_mass")
-        return (mass[..., None] * self.xipos[..., :2]).sum(dim=1) / mass.sum(dim=1)[:, None]
-
-    @override
-    def observations(self) -> Tensor:
-        blocks = [
-            getattr(self, name)[:, first:].flatten(1)
-            for name, first in _BLOCKS.items()
-            if getattr(self._env, f"_include_{name}_in_observation") is True
-        ]
-        return torch.cat([super().observations(), *blocks], dim=1)
-
-    def _contact_cost(self) -> Tensor:
-        cost = _cost(self._env._contact_cost_weight, self.cfrc_ext)
-        return cost.clamp(*self._env._contact_cost_range)
-
-    @override
-    def start_infos(self) -> Infos:
-        tendons = {"tendon_length": self.ten_length, "tendon_velocity": self.ten_velocity}
-        return super().start_infos() | {name: each.clone() for name, each in tendons.items()}
-
-
-TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
-    AntEnv: DeviceAnt,
-    ExtendedAntEnv: DeviceAnt,
-    InvertedPendulumEnv: DevicePendulum,
-    InvertedDoublePendulumEnv: DeviceDoublePendulum,
-    HalfCheetahEnv: DeviceCheetah,
-    HopperEnv: DeviceHopper,
-    Walker2dEnv: DeviceWalker,
-    SwimmerEnv: DeviceRunner,
-    HumanoidEnv: DeviceHumanoid,
-}
-"""Batched functions of bodies, keyed by the class of their CPU env."""
-
-
-def _base(env: Any) -> Any:
-    """Return Gymnasium's class of an env."""
+def gymnasium_class_of(env: Any) -> Any:
+    """Return the class of Gymnasium from which an env is derived."""
     return next(base for base in type(env).__mro__ if base.__module__.startswith("gymnasium."))
