@@ -195,6 +195,19 @@ class MissingExtra(ShapechangerError, ImportError):
         )
 
 
+@contextmanager
+def needing_extra(extra: str) -> Generator[None]:
+    """Raise a MissingExtra if an import in the block fails; `extra` installs the package."""
+    try:
+        yield
+    except Exception as error:
+        # Gymnasium's modules raise DependencyNotInstalled, which is no ImportError.
+        is_import = isinstance(error, ImportError) and not isinstance(error, MissingExtra)
+        if is_import or type(error).__name__ == "DependencyNotInstalled":
+            raise MissingExtra(getattr(error, "name", "") or "mujoco", extra) from error
+        raise
+
+
 _Error = TypeVar("_Error", bound=Exception)
 
 

@@ -24,7 +24,7 @@ from typing import Any, Final, Literal
 
 import msgspec
 
-from shapechanger.errors import HubError, MissingExtra, OutputError, ShapechangerError
+from shapechanger.errors import HubError, OutputError, ShapechangerError, needing_extra
 from shapechanger.layout import Layout
 
 Kind = Literal["policy", "demonstrations"]
@@ -190,10 +190,8 @@ def _hub(repo: str, kind: Kind) -> Generator[Any]:
     no_name = f"{repo!r} is no name of a repository: give owner and name, such as ada/ant."
     if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo, re.ASCII):
         raise HubError(no_name)
-    try:
+    with needing_extra("hub"):
         hub = import_module("huggingface_hub")
-    except ImportError as error:
-        raise MissingExtra("huggingface_hub", "hub") from error
     # Warnings and progress bars of huggingface_hub would clutter messages.
     utilities, errors = map(import_module, ("huggingface_hub.utils", "huggingface_hub.errors"))
     utilities.logging.set_verbosity_error()

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.cli.console import say
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import needing_extra
 from shapechanger.robot.check.report import Finding, Results, run_checks, write_report
 
 if TYPE_CHECKING:
@@ -57,10 +57,8 @@ def examine_machine(
     """Check what Shapechanger can do on this machine."""
     if requirements is None:
         requirements = importlib.metadata.requires(_PACKAGE) or []
-    try:
+    with needing_extra("cli"):
         from packaging.requirements import Requirement
-    except ImportError:
-        raise MissingExtra("packaging", "cli") from None
     parsed = [Requirement(text) for text in requirements]
     named = re.findall(r"""extra == ["'](.+?)["']""", " ".join(requirements))
     extras = sorted({*named} - {*_NOT_LISTED})

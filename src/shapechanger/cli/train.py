@@ -14,7 +14,7 @@ from shapechanger.cli.console import Interrupted, StudyProgress, command_line, s
 from shapechanger.cli.env_arguments import Body, EnvId, Learner, Settings, opened, settings_of
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.envs.catalogue import allow_own_modules, default_learner, driven, env_ref
-from shapechanger.errors import MissingExtra, StudyError, check_seed
+from shapechanger.errors import StudyError, check_seed, needing_extra
 from shapechanger.files import make_folder, require_file
 from shapechanger.policy import load_policy
 from shapechanger.transfer.executor import use_one_thread
@@ -91,10 +91,8 @@ class Train:
         if self.tensorboard is not None:
             if "callback" not in settings.takes:
                 raise StudyError(f"{learner} has no TensorBoard logs: leave out --tensorboard.")
-            try:
+            with needing_extra("learn"):
                 import_module("torch.utils.tensorboard")
-            except ImportError as error:
-                raise MissingExtra("tensorboard", "learn") from error
             make_folder(self.tensorboard)
         whole = settings.whole_updates(steps)
 

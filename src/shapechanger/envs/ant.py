@@ -12,16 +12,13 @@ import sys
 from collections.abc import Sequence
 from typing import Any, Final, cast
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import needing_extra
 
-try:
+with needing_extra("sim"):
     from gymnasium.envs.mujoco.ant_v5 import AntEnv as GymnasiumAntEnv
-except (ImportError, gym.error.DependencyNotInstalled) as error:
-    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN
 from shapechanger.envs.checks import check_action

@@ -21,18 +21,16 @@ from numpy.typing import NDArray
 from shapechanger.errors import (
     BrokenModel,
     EnvArgumentError,
-    MissingExtra,
     MorphologyError,
     ShapechangerError,
     UnknownName,
+    needing_extra,
     require_known,
 )
 
-try:
+with needing_extra("sim"):
     import mujoco
     from gymnasium.envs.mujoco import MujocoEnv
-except (ImportError, gym.error.DependencyNotInstalled) as error:
-    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.contract.env_ref import RETURN, Measure
 from shapechanger.envs.catalogue import MODEL_FILES, OWN_ROBOT

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, Final, cast
 
-import gymnasium as gym
 import numpy as np
 
-from shapechanger.errors import MissingExtra, MorphologyError
+from shapechanger.errors import MorphologyError, needing_extra
 
-try:
+with needing_extra("sim"):
     import mujoco
     from gymnasium.envs.mujoco.inverted_double_pendulum_v5 import (
         InvertedDoublePendulumEnv as GymnasiumInvertedDoublePendulumEnv,
@@ -18,8 +17,6 @@ try:
     from gymnasium.envs.mujoco.inverted_pendulum_v5 import (
         InvertedPendulumEnv as GymnasiumInvertedPendulumEnv,
     )
-except (ImportError, gym.error.DependencyNotInstalled) as error:
-    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.envs.checks import check_action
 from shapechanger.envs.layouts import position_features, velocity_features

@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.envs.opengl import choose_gl, open_context
-from shapechanger.errors import MissingExtra, RenderError
+from shapechanger.errors import RenderError, needing_extra
 
-try:
+with needing_extra("sim"):
     from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
-except ModuleNotFoundError as error:
-    raise MissingExtra(error.name or "mujoco", "sim") from error
 
 _Floats = NDArray[np.float64]
 

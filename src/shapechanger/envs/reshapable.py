@@ -12,17 +12,15 @@ from numpy.typing import NDArray
 from shapechanger.envs.opengl import choose_gl, require_screen
 from shapechanger.errors import (
     EnvArgumentError,
-    MissingExtra,
     SpaceMismatch,
     check_seed,
+    needing_extra,
     require_known,
 )
 
-try:
+with needing_extra("sim"):
     import mujoco
     from gymnasium.envs.mujoco import MujocoEnv
-except (ImportError, gym.error.DependencyNotInstalled) as error:
-    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.envs.checks import check_action, check_arguments
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features

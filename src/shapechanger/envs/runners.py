@@ -10,21 +10,18 @@ import warnings
 from collections.abc import Mapping
 from typing import Any, ClassVar, Final, cast
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import MissingExtra, MorphologyError
+from shapechanger.errors import MorphologyError, needing_extra
 
-try:
+with needing_extra("sim"):
     import mujoco
     from gymnasium.envs.mujoco.half_cheetah_v5 import HalfCheetahEnv as GymnasiumHalfCheetahEnv
     from gymnasium.envs.mujoco.hopper_v5 import HopperEnv as GymnasiumHopperEnv
     from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv as GymnasiumHumanoidEnv
     from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv as GymnasiumSwimmerEnv
     from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv as GymnasiumWalker2dEnv
-except (ImportError, gym.error.DependencyNotInstalled) as error:
-    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.contract.env_ref import FORWARD_SPEED, RETURN, Measure
 from shapechanger.envs.layouts import (

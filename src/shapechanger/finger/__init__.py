@@ -9,9 +9,7 @@ many fingers at once.
 
 from __future__ import annotations
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import needing_extra
 
-try:
+with needing_extra("sim"):
     import mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
-except ModuleNotFoundError as error:
-    raise MissingExtra("mujoco", "sim") from error

@@ -9,12 +9,10 @@
 
 from __future__ import annotations
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import needing_extra
 
-try:
+with needing_extra("sim"):
     import mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
-except ImportError as error:
-    raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.morphology.edits import EDITS, Edit
 from shapechanger.morphology.edits.limbs import (

@@ -9,14 +9,12 @@ import io
 from collections.abc import Callable
 from typing import Final
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import needing_extra
 
-try:
+with needing_extra("report"):
     import matplotlib.style
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-except ImportError as error:
-    raise MissingExtra("matplotlib", "report") from error
 
 # Palette of Okabe & Ito (2008), distinguishable with any colour vision. The green is darker than in
 # the palette, so that thin lines are visible on white. Purple, dark yellow and grey are additions.

@@ -7,13 +7,11 @@ from typing import Any, Final, cast
 
 from numpy.typing import NDArray
 
-from shapechanger.errors import MissingExtra, OutputError
+from shapechanger.errors import OutputError, needing_extra
 from shapechanger.files import require_file
 
-try:
+with needing_extra("sim"):
     import imageio.v3 as iio
-except ImportError as error:
-    raise MissingExtra("imageio", "sim") from error
 
 _WEBM: Final = ".webm"
 _FILMS: Final = (".avi", ".gif", ".mkv", ".mov", ".mp4", _WEBM)

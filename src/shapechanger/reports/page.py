@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import needing_extra
 from shapechanger.reports.numbers import count, duration_text, shares_text
 
 if TYPE_CHECKING:
@@ -31,10 +31,8 @@ def render(template: str | Path, **values: Any) -> str:
 
 @functools.cache
 def _environment(folder: Path) -> Environment:
-    try:
+    with needing_extra("report"):
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
-    except ImportError as error:
-        raise MissingExtra("jinja2", "report") from error
     environment = Environment(
         loader=FileSystemLoader([folder, _TEMPLATES]),
         autoescape=True,

@@ -13,18 +13,16 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any, Final
 
-from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.errors import StudyError, needing_extra
 from shapechanger.transfer.executor import Event, Executor, Job, OnProgress, failure_of, throttled
 
 # Set before Ray is imported; otherwise Ray reports usage statistics.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
 
-try:
+with needing_extra("ray"):
     import ray
     from ray.exceptions import RayError
     from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
-except ImportError as error:
-    raise MissingExtra("ray", "ray") from error
 
 _CONNECT_S: Final = 2.0
 _ANSWER_S: Final = 8.0

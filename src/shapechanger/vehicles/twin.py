@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 from shapechanger.contract.world import World
-from shapechanger.errors import MissingExtra, ProfileError, UnknownName
+from shapechanger.errors import ProfileError, UnknownName, needing_extra
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -15,13 +15,11 @@ from shapechanger.robot.twin.start import Place
 from shapechanger.vehicles.courses import WORLDS
 from shapechanger.vehicles.courses.course import HOME, require_element
 
-try:
+with needing_extra("sim"):
     from shapechanger.vehicles.bodies import VEHICLES, require_fit
     from shapechanger.vehicles.cameras.camera import find_corruption
     from shapechanger.vehicles.envs.drive import SimulatedRobot
     from shapechanger.vehicles.world import MujocoWorld
-except ModuleNotFoundError as error:
-    raise MissingExtra(error.name or "mujoco", "sim") from error
 
 ROOM = "room"
 """Name of the world that is a plain room for any robot."""

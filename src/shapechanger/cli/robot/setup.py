@@ -15,7 +15,7 @@ import tyro
 from rich.prompt import Prompt
 
 from shapechanger.cli.console import plain_console, say
-from shapechanger.errors import MissingExtra, RobotError, UnknownName
+from shapechanger.errors import RobotError, UnknownName, needing_extra
 from shapechanger.robot.client.known_robots import check_name, console_address, remember
 from shapechanger.robot.daemon.credentials import (
     Credentials,
@@ -166,10 +166,8 @@ class RobotKey:
         say(shown_credentials(self.name, credentials))
         if not self.qr:
             return
-        try:
+        with needing_extra("robot"):
             import segno
-        except ImportError as error:
-            raise MissingExtra("segno", "robot") from error
 
         robot = robot_at(self.address or f"{socket.gethostname()}.local", self.name, credentials)
         console = console_address(robot)

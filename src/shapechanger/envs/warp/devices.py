@@ -7,18 +7,14 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any, TypeVar, cast
 
-from shapechanger.errors import MissingExtra, UnknownName
+from shapechanger.errors import UnknownName, needing_extra
 
-try:
+with needing_extra("gpu"):
     import torch
     from torch import Tensor
-except ImportError as error:
-    raise MissingExtra("torch", "gpu") from error
-try:
+with needing_extra("gpu"):
     import mujoco_warp  # pyright: ignore[reportMissingTypeStubs]
     import warp
-except ImportError as error:
-    raise MissingExtra("mujoco-warp", "gpu") from error
 
 _Result = TypeVar("_Result")
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import MissingExtra, PolicyError, StudyError, UnknownName, no_policy_file
+from shapechanger.errors import PolicyError, StudyError, UnknownName, needing_extra, no_policy_file
 from shapechanger.layout import Layout
 from shapechanger.policy import Policy, PolicyCard
 from shapechanger.transfer.actions import ActionScale
@@ -40,7 +40,7 @@ from shapechanger.transfer.learners.settings import (
 from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 from shapechanger.transfer.transplant.model import check_supported
 
-try:
+with needing_extra("learn"):
     import torch
     from sb3_contrib import TQC
     from stable_baselines3 import PPO, SAC
@@ -51,8 +51,6 @@ try:
     from stable_baselines3.common.torch_layers import FlattenExtractor
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
     from torch import nn
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
 
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Act

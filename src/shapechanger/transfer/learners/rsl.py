@@ -19,13 +19,13 @@ import gymnasium as gym
 import numpy as np
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.errors import StudyError, needing_extra
 from shapechanger.registry import MAKERS
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.learners.policy_file import SpacesOnly
 from shapechanger.transfer.learners.sb3 import Progress, Sb3Learner
 
-try:
+with needing_extra("gpu"):
     import torch
     from rsl_rl.algorithms import PPO
     from rsl_rl.env import VecEnv as RslEnvs
@@ -35,8 +35,6 @@ try:
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecNormalize
     from tensordict import TensorDict
     from torch import Tensor
-except ImportError as error:
-    raise MissingExtra("rsl-rl-lib", "gpu") from error
 
 # The group of observations that actor and critic read.
 GROUP: Final = "policy"

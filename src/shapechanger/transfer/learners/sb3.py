@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from shapechanger.contract.env_ref import EnvRef, EnvTraits, is_single_instance, layouts_of
-from shapechanger.errors import MissingExtra, PolicyError, StudyError
+from shapechanger.errors import PolicyError, StudyError, needing_extra
 from shapechanger.policy import PolicyCard, load_policy
 from shapechanger.transfer.actions import require_ranges
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
@@ -32,15 +32,13 @@ from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.learners.vec_env import training_vec_env, with_scaled_actions
 from shapechanger.transfer.transplant import transplant
 
-try:
+with needing_extra("learn"):
     import torch
     from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.policies import ActorCriticPolicy
     from stable_baselines3.common.running_mean_std import RunningMeanStd
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
 
 OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]

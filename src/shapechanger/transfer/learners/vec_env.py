@@ -9,15 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import needing_extra
 from shapechanger.layout import Layout
 from shapechanger.registry import MAKERS
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 
-try:
+with needing_extra("learn"):
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecEnvWrapper
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
 
 
 class ThreadVecEnv(DummyVecEnv):

@@ -9,13 +9,11 @@ rounding. New inputs start with weights of zero and are trainable.
 that normalise its observations.
 """
 
-try:
+from shapechanger.errors import needing_extra
+
+with needing_extra("learn"):
     import stable_baselines3  # noqa: F401  # pyright: ignore[reportUnusedImport]
     import torch  # noqa: F401  # pyright: ignore[reportUnusedImport]
-except ImportError as error:
-    from shapechanger.errors import MissingExtra
-
-    raise MissingExtra("torch and stable-baselines3", "learn") from error
 
 from shapechanger.transfer.transplant.layers import transplant_normalisation
 from shapechanger.transfer.transplant.model import transplant

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import DemosError, MissingExtra, WorldError
+from shapechanger.errors import DemosError, WorldError, needing_extra
 
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import EpisodeHeader
@@ -188,10 +188,8 @@ def measure_camera(
     must be turned by some 30 to 45 degrees: seen straight on, a near board in a wide field of view
     looks like a far board in a narrow one. Raises a WorldError if the geometry is not determined.
     """
-    try:
+    with needing_extra("camera"):
         import cv2
-    except ImportError as error:
-        raise MissingExtra("cv2", "camera") from error
     height, width = picture.shape[:2]
     if min(corners) < 3:
         raise WorldError(f"A board needs at least 3 inner corners along each side, got {corners}.")

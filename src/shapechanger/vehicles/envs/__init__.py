@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import needing_extra
 
-try:
+with needing_extra("sim"):
     from shapechanger.vehicles.envs.ranges import RangesEnv
     from shapechanger.vehicles.envs.vehicle import VehicleEnv, WaypointEnv
-except ModuleNotFoundError as error:
-    raise MissingExtra(error.name or "mujoco", "sim") from error
 
 __all__ = ["RangesEnv", "VehicleEnv", "WaypointEnv"]
