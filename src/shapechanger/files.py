@@ -7,14 +7,21 @@ import errno
 import os
 import re
 import stat
-from collections.abc import Generator
+import tomllib
+from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
-from shapechanger.errors import CorruptStudy, OutputError, UnknownName
+from shapechanger.errors import (
+    CorruptStudy,
+    OutputError,
+    ShapechangerError,
+    StudyError,
+    UnknownName,
+)
 
 _T = TypeVar("_T")
 
@@ -152,6 +159,39 @@ def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
 def from_builtins(kind: Any, value: Any) -> Any:
     """Convert a value by its class's method `from_builtins`; a `dec_hook` of msgspec."""
     return kind.from_builtins(value)
+
+
+def converted(
+    value: Any, kind: Any, error: type[ShapechangerError], failure: str, *, strict: bool = True
+) -> Any:
+    """Convert builtin values to a type that msgspec knows; `failure` begins the error's message."""
+    try:
+        return msgspec.convert(value, kind, strict=strict)
+    except msgspec.ValidationError as cause:
+        raise error(f"{failure}: {str(cause).rstrip('.')}.") from cause
+
+
+def read_toml(path: Path, what: str, known: Iterable[str]) -> tuple[str, dict[str, Any]]:
+    """Return the text of a user's TOML file, and its content.
+
+    `what` names the kind of file in errors, and `known` has the names that exist without a file.
+    """
+    try:
+        text = read_text(path)
+        return text, tomllib.loads(text)
+    except FileNotFoundError:
+        raise UnknownName(what, str(path), known) from None
+    except (OSError, ValueError) as error:  # TOMLDecodeError is a ValueError.
+        raise StudyError(f"The {what} {path} cannot be read: {error}.") from error
+
+
+@contextmanager
+def reading(path: Path, error: type[ShapechangerError]) -> Generator[None]:
+    """Convert OSErrors of a block to errors of this class that name the file."""
+    try:
+        yield
+    except OSError as cause:
+        raise error(f"{path} cannot be read: {cause.strerror or cause}.") from cause
 
 
 @contextmanager

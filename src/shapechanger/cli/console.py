@@ -5,6 +5,8 @@ from __future__ import annotations
 import shlex
 import sys
 import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from typing import Final, Self
 
 from rich.console import Console
@@ -97,5 +99,17 @@ class StudyProgress:
         )
 
 
+NO_POLICY: Final = "Stopped; an interrupted training leaves no policy."
+
+
 class Interrupted(KeyboardInterrupt):
     """A long command was interrupted; the message explains how to resume it."""
+
+
+@contextmanager
+def interruptible(message: Callable[[], str]) -> Generator[None]:
+    """Replace Ctrl-C in a block by an `Interrupted` with this message."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Interrupted(message()) from None

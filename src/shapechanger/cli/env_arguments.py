@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
@@ -54,14 +54,9 @@ def asked(env: gym.Env[Any, Any], ability: str) -> Any:
     return offered
 
 
-@contextmanager
-def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
-    """Make an env and close it afterwards."""
-    made = env.make(**more)
-    try:
-        yield made
-    finally:
-        made.close()
+def opened(env: EnvRef, **more: Any) -> closing[gym.Env[Any, Any]]:
+    """Make an env, which is closed at the end of the `with` block."""
+    return closing(env.make(**more))
 
 
 def options_of(given: str, flag: str) -> dict[str, Any]:

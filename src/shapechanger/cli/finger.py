@@ -15,7 +15,7 @@ from shapechanger.cli.console import print_table, say
 from shapechanger.cli.env_arguments import EnvId, opened, options_of
 from shapechanger.envs.catalogue import env_ref
 from shapechanger.errors import FingerError, OutputError, StudyError, check_seed
-from shapechanger.files import read_file, require_file, write_atomic
+from shapechanger.files import read_file, reading, require_file, write_atomic
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.gap import resolve_gap, shipped_rig
 from shapechanger.finger.identify import identify, load_log, save_log
@@ -160,7 +160,5 @@ def _parameters(given: str) -> FingerParameters:
     path = Path(given)
     if given in PARAMETER_SETS or not (path.suffix or path.exists()):
         return named_set(given)
-    try:
+    with reading(path, FingerError):
         return FingerParameters.from_json(read_file(path, _MOST_BYTES))
-    except OSError as error:
-        raise FingerError(f"{path} cannot be read: {error.strerror or error}.") from error

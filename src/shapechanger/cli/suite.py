@@ -14,7 +14,7 @@ import tyro
 from rich.live import Live
 from rich.table import Table
 
-from shapechanger.cli.console import Interrupted, command_line, plain_console, print_table, say
+from shapechanger.cli.console import command_line, interruptible, plain_console, print_table, say
 from shapechanger.cli.transfer import StudyRuns, run_showing_progress
 from shapechanger.envs.catalogue import allow_own_modules, default_learner
 from shapechanger.envs.study_films import film_study
@@ -93,14 +93,15 @@ class SuiteRun(StudyRuns):
             try:
                 folder = open_study_folder(plan, page.out, name)
                 runs = unfinished_runs(plan, folder)
-                study = run_showing_progress(plan, folder, runs, executor=executor, traits=traits)
+                with interruptible(lambda: f"Stopped. Go on with: {command_line()}"):
+                    study = run_showing_progress(
+                        plan, folder, runs, executor=executor, traits=traits
+                    )
             except FailedRuns as error:
                 if plan.exclusive:  # A robot is the target, and the next study would move it.
                     raise
                 failed.append(f"{name}: {error}")
                 continue
-            except KeyboardInterrupt:
-                raise Interrupted(f"Stopped. Go on with: {command_line()}") from None
             page.add(name, study)
         _print_outcomes(page.outcomes())
         if failed:

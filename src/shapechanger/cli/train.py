@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
+from shapechanger.cli.console import NO_POLICY, StudyProgress, command_line, interruptible, say
 from shapechanger.cli.env_arguments import Body, EnvId, Learner, Settings, opened, settings_of
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.envs.catalogue import allow_own_modules, default_learner, driven, env_ref
@@ -65,11 +65,8 @@ class Train:
         steps, training = by
         require_file(out)  # The policy is written last; check first that it can be.
         use_one_thread()
-        try:
-            with StudyProgress({env.id: steps}) as progress:
-                policy = training(lambda done: progress(env.id, done, False))
-        except KeyboardInterrupt:
-            raise Interrupted("Stopped; an interrupted training leaves no policy.") from None
+        with interruptible(lambda: NO_POLICY), StudyProgress({env.id: steps}) as progress:
+            policy = training(lambda done: progress(env.id, done, False))
         policy.carded(command=command_line()).save(out)
         say(f"wrote {out}")
 

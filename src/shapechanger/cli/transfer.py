@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 
 from rich.table import Table
 
-from shapechanger.cli.console import Interrupted, StudyProgress, command_line, print_table, say
+from shapechanger.cli.console import StudyProgress, command_line, interruptible, print_table, say
 from shapechanger.cli.env_arguments import Learner, Settings, TwoEnvs, policy_file, settings_of
 from shapechanger.envs.catalogue import allow_own_modules, default_learner, short_name
 from shapechanger.errors import MapError, OutputError, StudyError, check_seed
@@ -166,11 +166,10 @@ class Transfer(TwoEnvs, StudyRuns):
         if len(to_do) < len(plan.runs()):
             say(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
         try:
-            study = run_showing_progress(
-                plan, out, to_do, source_policy=given, executor=executor, traits=traits
-            )
-        except KeyboardInterrupt:
-            raise Interrupted(f"Stopped. {_way_on(plan, out)}".rstrip()) from None
+            with interruptible(lambda: f"Stopped. {_way_on(plan, out)}".rstrip()):
+                study = run_showing_progress(
+                    plan, out, to_do, source_policy=given, executor=executor, traits=traits
+                )
         except OutputError as error:
             raise OutputError(f"{error} {_way_on(plan, out)}".rstrip()) from error
         _print(study)

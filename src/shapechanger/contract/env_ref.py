@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import LayoutError, ShapechangerError, StudyError, UnknownName
+from shapechanger.files import converted
 from shapechanger.identity import Identity, identify_env
 from shapechanger.layout import Layout
 
@@ -112,10 +113,7 @@ def each_body(env: EnvRef) -> list[EnvRef]:
     one = env.without("bodies")
     given = env.kwargs["bodies"]
     if isinstance(given, Mapping):
-        try:
-            draw = msgspec.convert(given, BodyDraw)
-        except msgspec.ValidationError as error:
-            raise StudyError(f"The bodies of {env.id} are wrong: {error}.") from None
+        draw = converted(given, BodyDraw, StudyError, f"The bodies of {env.id} are wrong")
         with closing(one.make()) as made:
             body: Any = made.unwrapped
             if not hasattr(body, "drawn_bodies"):

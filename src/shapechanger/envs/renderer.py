@@ -6,7 +6,7 @@ import copy
 import functools
 import weakref
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import Any, Final, cast
 
 import mujoco
@@ -174,10 +174,8 @@ def draw(
     data = _posed(model, pose)
     camera = {**_VIEW, "lookat": _geoms(model, data)[0], "distance": _DISTANCE_PER_REACH * reach}
     renderer = Renderer(model, data, camera, width, height, camera_id=-1, shadows=True)
-    try:
+    with closing(renderer):
         return np.array(renderer.render("rgb_array"), dtype=np.uint8)
-    finally:
-        renderer.close()
 
 
 def _posed(model: mujoco.MjModel, pose: _Floats) -> mujoco.MjData:

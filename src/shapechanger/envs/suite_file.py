@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Generator
 from contextlib import contextmanager
 from itertools import permutations, product
@@ -16,7 +15,7 @@ import msgspec
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import driven, env_ref, short_name
 from shapechanger.errors import StudyError, UnknownName
-from shapechanger.files import place_of, read_text
+from shapechanger.files import place_of, read_text, read_toml
 from shapechanger.transfer.plan import TransferTask
 
 _SHIPPED: Final = Path(__file__).parent / "suites"
@@ -77,16 +76,9 @@ def shipped_suites() -> tuple[str, ...]:
 def load_suite(name: str) -> SuiteFile:
     """Load a suite."""
     path = _SHIPPED / f"{name}.toml" if name in shipped_suites() else Path(name)
+    text, given = read_toml(path, "suite", shipped_suites())
     try:
-        text = read_text(path)
-    except FileNotFoundError:
-        raise UnknownName("suite", name, shipped_suites()) from None
-    except (OSError, ValueError) as error:
-        raise StudyError(f"The suite {path} cannot be read: {error}.") from error
-    try:
-        return msgspec.convert(tomllib.loads(text), SuiteFile)
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"{path} is not valid TOML: {error}.") from None
+        return msgspec.convert(given, SuiteFile)
     except msgspec.ValidationError as error:
         reason: Exception = error
         if unknown := re.search(r"unknown field `(\w+)`(?: - at `\$\.(\w+))?", str(error)):

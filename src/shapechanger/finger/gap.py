@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, require_known
-from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters, converted
+from shapechanger.files import converted
+from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
 from shapechanger.finger.tensions import spans_all_torques
 
 # Largest number of draws. Fingers whose tendons cannot balance the joints are rejected: one in
@@ -220,4 +221,4 @@ def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:
     if isinstance(value, str):
         require_known("gap", GAPS, value)
         return GAPS[value]
-    return converted("The ranges of a gap are malformed", value, Gap)
+    return converted(value, Gap, FingerError, "The ranges of a gap are malformed")

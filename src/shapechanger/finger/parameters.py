@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, require_known
+from shapechanger.files import converted
 from shapechanger.finger.anatomy import (
     AN_1983_ARMS,
     JOINT_DAMPING,
@@ -36,17 +37,6 @@ def as_numbers(value: Any) -> NDArray[np.float64]:
         return np.asarray(value, np.float64)
     except (TypeError, ValueError):
         return np.empty(0)
-
-
-_T = TypeVar("_T")
-
-
-def converted(failure: str, value: Any, kind: type[_T]) -> _T:
-    """Convert builtin values to a struct, or raise a FingerError that begins with `failure`."""
-    try:
-        return msgspec.convert(value, kind)
-    except msgspec.ValidationError as error:
-        raise FingerError(f"{failure}: {str(error).rstrip('.')}.") from error
 
 
 class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -140,7 +130,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         if isinstance(path, Mapping):
             names = cast("Mapping[str, Any]", path)
             require_known("parameter of a command path", CommandPath.__struct_fields__, *names)
-            path = converted("A command path is malformed", path, CommandPath)
+            path = converted(path, CommandPath, FingerError, "A command path is malformed")
             msgspec.structs.force_setattr(self, "path", path)
         if self.tendon_stiffness is None:
             if self.backlash:

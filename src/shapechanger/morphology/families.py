@@ -21,6 +21,7 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, require_known
+from shapechanger.files import converted
 from shapechanger.morphology.edits import EDITS, Edit, part_of_the_way
 from shapechanger.morphology.edits.places import Stretch
 from shapechanger.morphology.edits.values import Friction, Gear, Mass
@@ -84,10 +85,7 @@ def _edit(item: Any) -> Edit:
     kind = EDITS[name]
     own = [field for field in fields if field != "edit"]
     require_known(f"field of {name!r}", kind.__struct_fields__, *own)
-    try:
-        return msgspec.convert(fields, kind)
-    except msgspec.ValidationError as error:
-        raise MorphologyError(f"{fields['edit']}: {error}") from error
+    return converted(fields, kind, MorphologyError, name)
 
 
 def interpolate(a: Body, b: Body, alpha: float) -> Body:

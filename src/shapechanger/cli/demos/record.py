@@ -11,8 +11,8 @@ import gymnasium as gym
 import tyro
 from gymnasium.wrappers import TimeLimit
 
-from shapechanger.cli.console import Interrupted, StudyProgress, command_line, counted, say
-from shapechanger.cli.env_arguments import OneEnv, options_of
+from shapechanger.cli.console import StudyProgress, command_line, counted, interruptible, say
+from shapechanger.cli.env_arguments import OneEnv, opened, options_of
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.drivers import EXPERT, pilot_of, record_steps
 from shapechanger.demos.episodes import episode_at
@@ -52,8 +52,8 @@ class DemosRecord(OneEnv):
             if not 0.0 < value < float("inf"):
                 raise DemosError(f"--{name} must be above 0, got {value}.")
         ref = self._ref()
-        made = ref.make(max_episode_steps=-1)
-        try:
+        stopped = f"Stopped; the recording so far is in {self.out}, complete."
+        with interruptible(lambda: stopped), opened(ref, max_episode_steps=-1) as made:
             hz = float(made.metadata.get("render_fps") or 20.0)
             longest = max(1, round(self.episode_s * hz))
             steps = max(1, round(self.minutes * 60.0 * hz))
@@ -67,12 +67,6 @@ class DemosRecord(OneEnv):
                 record_steps(
                     env, pilot, steps, self.seed, lambda done: progress(ref.id, done, done == steps)
                 )
-        except KeyboardInterrupt:
-            raise Interrupted(
-                f"Stopped; the recording so far is in {self.out}, complete."
-            ) from None
-        finally:
-            made.close()
         if self.corrected_by:
             say(
                 f"the expert corrected {pilot.corrected / max(pilot.steps, 1):.0%} of the steps, "

@@ -11,7 +11,7 @@ import numpy as np
 import tyro
 from msgspec.structs import replace
 
-from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
+from shapechanger.cli.console import NO_POLICY, StudyProgress, command_line, interruptible, say
 from shapechanger.demos.clone_report import outlook, write_report
 from shapechanger.demos.cloning.clone import ShrunkFrames, load_clone, settings_for
 from shapechanger.demos.cloning.evaluation import EvaluationResult, evaluate
@@ -109,7 +109,7 @@ class DemosTrain(_Waypoints):
         learned = ~evaluated
         n = int(learned.sum())
         say(f"{n} steps to learn from, {len(data) - n} to evaluate on")
-        try:
+        with interruptible(lambda: NO_POLICY):
             names = [f"network {member + 1}" for member in range(settings.members)]
             with StudyProgress(dict.fromkeys(names, settings.steps(n))) as progress:
 
@@ -126,8 +126,6 @@ class DemosTrain(_Waypoints):
                     seed=self.seed,
                     on_check=on_check,
                 )
-        except KeyboardInterrupt:
-            raise Interrupted("Stopped; an interrupted training leaves no policy.") from None
         say(training.mirror_note)
         body = "" if view is not None else data.body
         net = replace(policy.net, body=body, control_hz=data.control_hz)

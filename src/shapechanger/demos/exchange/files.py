@@ -24,11 +24,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger import files
 from shapechanger.demos.episodes import Driver, EpisodeHeader
 from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES, MAX_TEXT_BYTES
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
 from shapechanger.errors import DemosError, LayoutError, MissingExtra, OutputError, translate_errors
-from shapechanger.files import read_file, writing
+from shapechanger.files import read_file, reading, writing
 
 MAX_UNPACKED: Final = 64 << 20  # Unpacked bytes in memory; `MAX_PIXELS` need 48 MiB.
 MAX_VALUES: Final = 1 << 17  # Of a feature.
@@ -86,10 +87,8 @@ def inside(folder: Path, name: str, named_by: object) -> Path:
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a regular file of at most `MAX_TEXT_BYTES`."""
-    try:
+    with reading(path, DemosError):
         return read_file(path, MAX_TEXT_BYTES)
-    except OSError as error:
-        raise DemosError(f"{path} cannot be read: {error.strerror}.") from error
 
 
 def read_text(path: Path) -> str:
@@ -165,10 +164,7 @@ def _pixels(data: bytes) -> NDArray[np.uint8] | None:
 
 def converted(plain: Any, kind: Any, where: object, *, strict: bool = True) -> Any:
     """Convert a value to a type that msgspec knows; `where` names its source in errors."""
-    try:
-        return msgspec.convert(plain, kind, strict=strict)
-    except msgspec.ValidationError as error:
-        raise DemosError(f"{where} is damaged: {error}.") from error
+    return files.converted(plain, kind, DemosError, f"{where} is damaged", strict=strict)
 
 
 def parse_json(text: str | bytes, where: object, kind: Any) -> Any:

@@ -11,7 +11,7 @@ from typing import Any, Final, TypeVar, cast
 import msgspec
 
 from shapechanger.errors import StudyError, UnknownName, require_known
-from shapechanger.files import place_of, read_text
+from shapechanger.files import converted, place_of, read_toml
 from shapechanger.registry import LEARNERS as KINDS
 from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.settings import ImportedSettings
@@ -104,13 +104,7 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Lear
 
 def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, LearnerSettings]:
     """Read a TOML file that names a preset or an algorithm, and changes some of its settings."""
-    try:
-        text = read_text(path)
-        given = tomllib.loads(text)
-    except FileNotFoundError:
-        raise UnknownName("learner", str(path), LEARNERS) from None
-    except (OSError, ValueError) as error:  # TOMLDecodeError is a ValueError.
-        raise StudyError(f"The learner {path} cannot be read: {error}.") from error
+    text, given = read_toml(path, "learner", LEARNERS)
     start = given.pop("preset", None) or given.pop("algorithm", None)
     if not isinstance(start, str) or start.endswith(".toml"):
         raise StudyError(
@@ -136,7 +130,4 @@ def _imported(algorithm: str, changed: Mapping[str, Any]) -> ImportedSettings:
 
 
 def _converted(name: str, kind: type[_Kind], values: dict[str, Any]) -> _Kind:
-    try:
-        return msgspec.convert(values, kind, strict=True)
-    except msgspec.ValidationError as error:
-        raise StudyError(f"The settings of {name} are wrong: {str(error).rstrip('.')}.") from None
+    return converted(values, kind, StudyError, f"The settings of {name} are wrong")

@@ -242,11 +242,8 @@ class OffDynamics(Method):
 
     def learn(self, run: MethodRun) -> Any:
         """Train in the source while acting on the target."""
-        correction = _Correction(run)
-        try:
+        with closing(_Correction(run)) as correction:
             return run.train(run.source, run.source_steps, callback=correction)
-        finally:
-            correction.close()
 
 
 def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transitions:

@@ -143,14 +143,11 @@ class PolicyDriver:
 
     def run(self) -> None:
         """Drive whenever a person permits it, until `end` is called."""
-        env = self._env()
-        try:
+        with contextlib.closing(self._env()) as env:
             while not self._ended.is_set():
                 # A reset is refused while the robot is disarmed or another client has control.
                 with contextlib.suppress(RobotRefused):
                     self._drive(env, env.reset()[0])
-        finally:
-            env.close()
 
     def _run(self) -> None:
         try:
