@@ -171,6 +171,14 @@ def converted(
         raise error(f"{failure}: {str(cause).rstrip('.')}.") from cause
 
 
+def decoded(text: str | bytes, kind: type[_T], error: type[ShapechangerError], failure: str) -> _T:
+    """Decode JSON to a type that msgspec knows; `failure` begins the error's message."""
+    try:
+        return msgspec.json.decode(text, type=kind)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as cause:
+        raise error(f"{failure}: {str(cause).rstrip('.')}.") from cause
+
+
 def read_toml(path: Path, what: str, known: Iterable[str]) -> tuple[str, dict[str, Any]]:
     """Return the text of a user's TOML file, and its content.
 

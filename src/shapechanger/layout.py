@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import LayoutError, UnknownName
+from shapechanger.files import decoded
 
 ElementKind = Literal["body", "joint", "actuator", "tendon", "sensor", "camera", "task"]
 
@@ -198,10 +199,7 @@ class Layout(msgspec.Struct, frozen=True):
         Raises:
             LayoutError: If the text is not a layout.
         """
-        try:
-            return msgspec.json.decode(text, type=cls)
-        except msgspec.MsgspecError as error:
-            raise LayoutError(f"This is not a layout: {error}.") from error
+        return decoded(text, cls, LayoutError, "This is not a layout")
 
     def _per_number(self, values: list[float]) -> NDArray[np.float64]:
         return np.repeat(np.asarray(values, dtype=np.float64), [f.size for f in self.features])

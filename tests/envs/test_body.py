@@ -131,7 +131,7 @@ def test_a_body_is_given_in_any_form(body: BodyLike) -> None:
         (7, MorphologyError, "made of edits such as Stretch"),
         (None, MorphologyError, "made of edits such as Stretch"),
         (Cut("torso", 0.5), MorphologyError, "'torso' is the trunk"),
-        (Mass("shank_1", to=1e-18), BrokenModel, "MuJoCo does not compile the body .*mass"),
+        (Mass("shank_1", to=1e-18), BrokenModel, "MuJoCo cannot compile the body .*mass"),
     ],
 )
 def test_an_invalid_body_is_refused(

@@ -75,7 +75,7 @@ def test_a_body_that_does_not_compile_is_refused(edit: Edit) -> None:
     with pytest.raises(BrokenModel) as caught:
         built(leg(), edit)
     message = str(caught.value)
-    found = re.fullmatch(r"MuJoCo does not compile the body (\[.*\]): ([^\n]*[^.\n])\.", message)
+    found = re.fullmatch(r"MuJoCo cannot compile the body (\[.*\]): ([^\n]*[^.\n])\.", message)
     assert found
     assert json.loads(found[1])[0]["edit"] == type(edit).__name__.lower()
     assert found[2].startswith("mass and inertia of moving bodies must be larger than mjMINVAL")

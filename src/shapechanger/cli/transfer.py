@@ -14,7 +14,7 @@ from shapechanger.cli.console import StudyProgress, command_line, interruptible,
 from shapechanger.cli.env_arguments import Learner, Settings, TwoEnvs, policy_file, settings_of
 from shapechanger.envs.catalogue import allow_own_modules, default_learner, short_name
 from shapechanger.errors import MapError, OutputError, StudyError, check_seed
-from shapechanger.files import read_text
+from shapechanger.files import read_toml
 from shapechanger.transfer.executor import Executor, Processes
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.settings import study_budgets
@@ -138,10 +138,7 @@ class Transfer(TwoEnvs, StudyRuns):
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
 
-        try:
-            map_text = read_text(self.map) if self.map else ""
-        except (OSError, ValueError) as error:
-            raise MapError(f"The body map {self.map} cannot be read: {error}.") from error
+        map_text = read_toml(self.map, "body map", ())[0] if self.map else ""
         traits = inspect_task(task)
         given = self.source_policy and policy_file(self.source_policy, task.source)
         plan = make_plan(

@@ -31,10 +31,7 @@ _LONGEST_BODY: Final = 60
 def check_action(env: Any, action: Any) -> NDArray[Any]:
     """Return an action as an array, or refuse its shape, or numbers that are not finite."""
     name = type(env).__name__ if env.spec is None else env.spec.id
-    try:
-        array = np.asarray(action)
-    except ValueError as error:  # Lists of different lengths in a list.
-        raise BadAction(f"{name} takes arrays of numbers as actions: {error}.") from error
+    array = _as_array(action, f"{name} takes arrays of numbers as actions")
     expected = (env.action_layout.size,)
     if array.dtype.kind not in _NUMBERS:
         raise BadAction(f"{name} takes numbers as actions, got {array.dtype}.")
@@ -57,10 +54,7 @@ def check_actions(
 
     Numbers that are not finite are accepted for envs in `ignored`, which are about to be reset.
     """
-    try:
-        given = np.asarray(actions)
-    except ValueError as error:
-        raise BadAction(f"Actions must have the shape {shape} each, got several.") from error
+    given = _as_array(actions, f"Actions must have the shape {shape} each")
     if given.shape != (num_envs, *shape):
         raise BadAction(f"Actions must have the shape {(num_envs, *shape)}, got {given.shape}.")
     if given.dtype.kind not in _BATCH_NUMBERS:
@@ -73,6 +67,13 @@ def check_actions(
                 f"The action of env {bad[0]} has numbers that are not finite: {given[bad[0]]}."
             )
     return given
+
+
+def _as_array(actions: Any, rule: str) -> NDArray[Any]:
+    try:
+        return np.asarray(actions)
+    except ValueError as error:  # Lists of different lengths in a list.
+        raise BadAction(f"{rule}: {error}.") from error
 
 
 # Arguments of Gymnasium's base class that its envs set themselves.

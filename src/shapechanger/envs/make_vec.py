@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal, overload
 import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 
-from shapechanger.envs.catalogue import CATALOGUE, find
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.envs.catalogue import find
 from shapechanger.envs.vector.env import ThreadVectorEnv
-from shapechanger.errors import UnknownName, VectorEnvError, require_known
+from shapechanger.errors import VectorEnvError, require_known
 
 if TYPE_CHECKING:
     from shapechanger.envs.warp.env import WarpVectorEnv
@@ -122,7 +123,7 @@ def make_vec(
         limits = {"nconmax": nconmax, "njmax": njmax}
         place = find_device(device)
         envs = WarpVectorEnv(
-            make_reader(made_from, partial(_make, made_from), arguments),
+            make_reader(made_from, lambda given: EnvRef(made_from, given).make(), arguments),
             pool or bodies or [None],
             count,
             device=place,
@@ -138,7 +139,7 @@ def make_vec(
             each = [{**arguments, "body": body} for body in bodies]
         cores = _cores() if threads is None else _at_least_one("thread", threads)
         envs = ThreadVectorEnv(
-            [partial(_make, made_from, one) for one in each],
+            [EnvRef(made_from, one).make for one in each],
             threads=min(cores, count),
             autoreset_mode=mode,
             copy=copy,
@@ -159,13 +160,6 @@ def __getattr__(name: str) -> Callable[..., Any]:
     if name.startswith("_"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return partial(make_vec, name)
-
-
-def _make(env_id: str, arguments: dict[str, Any]) -> gym.Env[Any, Any]:
-    try:
-        return gym.make(env_id, **arguments)
-    except (gym.error.UnregisteredEnv, ModuleNotFoundError) as error:
-        raise UnknownName("environment", env_id, CATALOGUE) from error
 
 
 def _cores() -> int:

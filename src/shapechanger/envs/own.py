@@ -5,8 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import re
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from os import fspath
@@ -22,7 +21,6 @@ from shapechanger.errors import (
     BrokenModel,
     EnvArgumentError,
     MorphologyError,
-    ShapechangerError,
     UnknownName,
     needing_extra,
     require_known,
@@ -47,7 +45,7 @@ from shapechanger.envs.own_tasks import (
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
 from shapechanger.morphology import Body, as_body, name_elements, reason_of, reshape, to_json
-from shapechanger.morphology.families import BodyLike, Family
+from shapechanger.morphology.families import BodyLike, Family, compiling
 from shapechanger.morphology.pose import (
     StartRules,
     floor_height,
@@ -73,17 +71,6 @@ _CONTROL_STEP_S: Final = 0.02
 # Name of the start pose in common collections of models.
 _HOME: Final = "home"
 _J: Final = mujoco.mjtJoint
-
-
-@contextmanager
-def compiling(path: Path, verb: str = "compile") -> Generator[None]:
-    """Report errors of MuJoCo as a `BrokenModel` with the name of a file."""
-    try:
-        yield
-    except ShapechangerError:
-        raise
-    except (ValueError, mujoco.FatalError) as error:
-        raise BrokenModel(f"MuJoCo cannot {verb} {path.name}: {reason_of(error)}.") from error
 
 
 @dataclass(frozen=True)
@@ -112,13 +99,13 @@ class OwnFamily(Family):
                 folder has a file of a package.
             MorphologyError: If the rig does not fit the model.
         """
-        with compiling(Path(path), "read"):
+        with compiling(f"read {Path(path).name}"):
             spec = mujoco.MjSpec.from_file(str(path))
         _find_packages(spec, Path(path))
         # By default, MuJoCo would merge the base of a URDF into the world, and lose its names.
         spec.compiler.fusestatic = False
         name_elements(spec)
-        with compiling(Path(path)):
+        with compiling(f"compile {Path(path).name}"):
             return reshape(spec, self.rig)
 
 
@@ -274,7 +261,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         self.family = self._file = own_family(path, as_body(rig))
         self._begin(body, arguments)
         spec = self.family.load(self._file.path)
-        with compiling(self._file.path):
+        with compiling(f"compile {self._file.path.name}"):
             plain = spec.copy().compile()
         has_home = mujoco.mj_name2id(plain, mujoco.mjtObj.mjOBJ_KEY, _HOME) >= 0
         # The joints that the keyframe poses; edits may add others.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, require_known
-from shapechanger.files import converted
+from shapechanger.files import converted, decoded
 from shapechanger.finger.anatomy import (
     AN_1983_ARMS,
     JOINT_DAMPING,
@@ -194,11 +194,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         Raises:
             FingerError: If the text is not a valid finger.
         """
-        try:
-            return msgspec.json.decode(text, type=cls)
-        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-            reason = str(error).rstrip(".")
-            raise FingerError(f"Invalid finger parameters: {reason}.") from error
+        return decoded(text, cls, FingerError, "Invalid finger parameters")
 
 
 NOMINAL: Final = FingerParameters()

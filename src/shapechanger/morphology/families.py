@@ -10,7 +10,8 @@ from __future__ import annotations
 import difflib
 import json
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Generator, Hashable, Iterable, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -165,6 +166,17 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
     return result
 
 
+@contextmanager
+def compiling(work: str) -> Generator[None]:
+    """Report errors of MuJoCo as a `BrokenModel`; `work` is what MuJoCo cannot do then."""
+    try:
+        yield
+    except ShapechangerError:
+        raise
+    except (ValueError, mujoco.FatalError) as error:
+        raise BrokenModel(f"MuJoCo cannot {work}: {reason_of(error)}.") from error
+
+
 def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjModel:
     """Compile a copy of a specification with edits applied in order.
 
@@ -172,13 +184,8 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
         MorphologyError: As for `reshape`; a `BrokenModel` if MuJoCo does not compile the result.
     """
     body = tuple(edits)
-    try:
+    with compiling(f"compile the body {to_json(body)}"):
         model = reshape(spec, body).compile()
-    except (ValueError, mujoco.FatalError) as error:
-        if isinstance(error, ShapechangerError):
-            raise
-        text = f"MuJoCo does not compile the body {to_json(body)}: {reason_of(error)}."
-        raise BrokenModel(text) from error
     if mujoco.__version__ == _WRONG_SPARSE and mujoco.mj_isSparse(model):
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     return model

@@ -16,7 +16,6 @@ import torch
 from torch import Tensor, nn
 
 from shapechanger.contract.env_ref import EnvRef, layouts_of
-from shapechanger.errors import StudyError, TransplantError
 from shapechanger.policy import PolicyCard, export_network
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.identities import identities_in
@@ -28,15 +27,12 @@ from shapechanger.transfer.transplant.model import check_supported
 
 
 def export_onnx(policy: TrainedPolicy, path: Path) -> None:
-    """Write a policy as ONNX; StudyError unless it is an `MlpPolicy` of PPO, SAC or TQC.
+    """Write a policy as ONNX; TransplantError unless it is an `MlpPolicy` of PPO, SAC or TQC.
 
     The input `observation` is float64 of shape (n, observations), as the env returns it. The output
     `action` is float32 of shape (n, actions), in the units of the env.
     """
-    try:
-        check_supported(policy.model)
-    except TransplantError as error:
-        raise StudyError(f"This policy cannot be exported: {error}") from error
+    check_supported(policy.model)
     _write(_MeanActions(policy), policy.card, path)
 
 

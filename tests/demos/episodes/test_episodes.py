@@ -238,7 +238,7 @@ def test_an_invalid_step_is_refused(
 )
 def test_an_invalid_header_is_refused(tmp_path: Path, change: dict[str, object]) -> None:
     """An invalid header, and a disk that is nearly full, are refused."""
-    with pytest.raises(DemosError, match=f"The header is invalid .*{next(iter(change))}"):
+    with pytest.raises(DemosError, match=f"The header is invalid: .*{next(iter(change))}"):
         EpisodeWriter.create(tmp_path / "data", header(**change), spare_bytes=0)
     assert not (tmp_path / "data").exists()
     with pytest.raises(OutputError, match="MB of the disk are free"):

@@ -126,7 +126,7 @@ def _with(place: tuple[int, ...], value: float) -> Any:
         (_with((2, 0), np.inf), "action of env 2 has numbers that are not finite"),
         (np.zeros((3, 7)), r"shape \(3, 8\), got \(3, 7\)"),
         (np.zeros((2, 8)), r"shape \(3, 8\), got \(2, 8\)"),
-        ([np.zeros(8), np.zeros(8), np.zeros(9)], r"shape \(8,\) each, got several"),
+        ([np.zeros(8), np.zeros(8), np.zeros(9)], r"shape \(8,\) each: "),
         (np.zeros(24), r"shape \(3, 8\), got \(24,\)"),
         (0.0, r"shape \(3, 8\), got \(\)"),
         (np.full((3, 8), "left"), "Actions must be numbers"),

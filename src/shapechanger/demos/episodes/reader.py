@@ -42,7 +42,7 @@ from shapechanger.demos.episodes.records import (
     write_header,
 )
 from shapechanger.errors import BrokenEpisode, DemosError, OutputError, UnknownName
-from shapechanger.files import read_file, write_atomic, writing
+from shapechanger.files import read_file, reading, write_atomic, writing
 
 _LOST: Final = "lost"  # Folder of an episode for lines and images that `repair` moves aside.
 
@@ -243,10 +243,8 @@ def _checked_lines(
     path: Path, header: EpisodeHeader, *, thorough: bool = False
 ) -> Iterator[tuple[bytes, Step | Edit | None, str]]:
     """Yield each line of an episode, its content, and why it or its image is invalid, or ""."""
-    try:
+    with reading(path / STEPS, DemosError):
         content = read_file(path / STEPS, MAX_TEXT_BYTES)
-    except OSError as error:
-        raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
     sizes = header.action_layout.size, header.state_layout.size
     newest, sound = -1, None  # Index of the newest step, and the newest image that is sound.
     for raw in io.BytesIO(content):

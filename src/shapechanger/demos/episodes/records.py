@@ -20,7 +20,7 @@ import numpy as np
 from msgspec import Meta
 
 from shapechanger.errors import DemosError, OutputError
-from shapechanger.files import read_file, write_atomic, writing
+from shapechanger.files import converted, read_file, write_atomic, writing
 from shapechanger.layout import Layout
 
 HEADER: Final = "episode.json"
@@ -166,10 +166,7 @@ class EpisodeHeader:
                 f"reads format {_FORMAT} only."
             )
         fields = {name: value for name, value in plain.items() if name != "state_layout" or value}
-        try:
-            return msgspec.convert(fields, cls)
-        except msgspec.ValidationError as error:
-            raise DemosError(f"The header is invalid ({error}).") from error
+        return converted(fields, cls, DemosError, "The header is invalid")
 
 
 Driver = Literal["person", "policy", "expert", "program"]

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import layouts_of
-from shapechanger.errors import FingerError, OutputError, require_known
-from shapechanger.files import read_file
+from shapechanger.errors import FingerError, require_known
+from shapechanger.files import read_file, writing
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.controller import FingerBabble, places_of
 from shapechanger.finger.parameters import FingerParameters
@@ -165,11 +165,9 @@ def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
     )
     arrays = {name: getattr(log, name) for name in SIGNALS}
     encoded = np.frombuffer(msgspec.json.encode(header), np.uint8)
-    try:
-        with Path(path).open("wb") as file:  # NumPy would add a suffix to a path.
-            np.savez_compressed(file, header=encoded, **arrays)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}.") from error
+    # NumPy would add a suffix to a path.
+    with writing(Path(path)), Path(path).open("wb") as file:
+        np.savez_compressed(file, header=encoded, **arrays)
 
 
 def load_log(path: str | os.PathLike[str]) -> FingerLog:

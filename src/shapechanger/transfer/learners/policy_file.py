@@ -291,11 +291,7 @@ def require_class(algorithm: str) -> None:
             f"A policy of {algorithm} needs the module {module}, which a file may not import: "
             f"name it too, as load_policy(path, {algorithm!r}) or --learner {algorithm}."
         )
-    try:
-        known = _is_class(_load(algorithm))
-    except UnknownName as error:
-        raise ValueError(f"its algorithm {algorithm} cannot be imported") from error
-    if not known:
+    if not _is_class(_load(algorithm)):
         raise ValueError(f"its algorithm {algorithm} is a function, which a file may not call")
 
 
