@@ -39,8 +39,7 @@ def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
         action_layout=profile.action_layout(),
         state_layout=profile.state_layout(),
         size=(0, 0) if camera is None else camera.size,
-        camera_pitch_deg=None if camera is None else camera.pitch_deg,
-        camera_fovy_deg=None if camera is None else camera.fovy_deg,
+        camera_deg=(None, None) if camera is None else (camera.pitch_deg, camera.fovy_deg),
     )
 
 

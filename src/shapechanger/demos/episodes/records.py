@@ -141,6 +141,11 @@ class EpisodeHeader:
     version: str = ""
     format: int = _FORMAT
 
+    @property
+    def camera_deg(self) -> tuple[float | None, float | None]:
+        """Pitch and vertical field of view of the camera, degrees, as far as they are known."""
+        return self.camera_pitch_deg, self.camera_fovy_deg
+
     def __post_init__(self) -> None:
         # A few bytes can describe more values than any memory holds.
         if not 1 <= self.action_layout.size <= _MAX_VALUES >= self.state_layout.size:

@@ -59,6 +59,11 @@ class RobotCard(msgspec.Struct, frozen=True, kw_only=True):
     camera_fovy_deg: float | None = None
     turning: tuple[float, float] | None = None
 
+    @property
+    def camera_deg(self) -> tuple[float | None, float | None]:
+        """Pitch and vertical field of view of the camera, degrees, as far as they are known."""
+        return self.camera_pitch_deg, self.camera_fovy_deg
+
 
 def card_of(
     profile: Profile,

@@ -132,7 +132,7 @@ class CanonicalView:
             )
         if header.action_layout.names[0].startswith("waypoint/"):
             return picture
-        camera, pitch, fovy = self._camera, header.camera_pitch_deg, header.camera_fovy_deg
+        camera, (pitch, fovy) = self._camera, header.camera_deg
         if camera is None:
             if pitch is None or fovy is None:
                 raise DemosError(

@@ -57,8 +57,8 @@ class SimulatedRobot(msgspec.Struct, frozen=True):
     action_layout: Layout
     state_layout: Layout
     size: tuple[int, int]  # Width and height of frames, pixels; (0, 0) without a camera.
-    camera_pitch_deg: float | None  # Angle of the camera's axis below the horizon, if known.
-    camera_fovy_deg: float | None  # Vertical field of view, if known.
+    # Angle of the camera's axis below the horizon, and vertical field of view, degrees, if known.
+    camera_deg: tuple[float | None, float | None]
 
 
 @functools.cache
@@ -166,9 +166,10 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             require_known("render mode", self.metadata["render_modes"], render_mode)
         self.render_mode, self._puts_back = render_mode, put_back
         self._seeds, self._randomise = _course_seeds(courses), randomise
+        pitch_deg, fovy_deg = robot.camera_deg
         self.world = MujocoWorld(
             vehicle, world, self._seeds[0], size=robot.size if has_camera or render_mode else None,
-            pitch_deg=robot.camera_pitch_deg, fovy_deg=robot.camera_fovy_deg, coarse=coarse,
+            pitch_deg=pitch_deg, fovy_deg=fovy_deg, coarse=coarse,
             lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )  # fmt: skip
         self.parts = frozenset(output.part for output in robot.plan.outputs)

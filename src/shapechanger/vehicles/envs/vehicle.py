@@ -301,7 +301,7 @@ class WaypointEnv(WaypointView, DriveEnv):
         env: DriveEnv = (VehicleEnv if sensed else RangesEnv)(vehicle, **inner, **task)
         self.parts, self.world = env.parts, env.world
         self._see(
-            env, profile.path, (profile.camera_pitch_deg, profile.camera_fovy_deg, profile.size),
+            env, profile.path, (*profile.camera_deg, profile.size),
             ("speed", "yaw_rate"), ProfileError, turns_on_the_spot=body.turning_radius_m == 0.0,
         )  # fmt: skip
         self.response = _response_of(vehicle, world, robot, sensed, self._motion_at)

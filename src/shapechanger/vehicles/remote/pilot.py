@@ -62,7 +62,7 @@ def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
         card.require_layouts(actions, state)
     if net.eyes != "none" and robot.image_size is None:
         raise RobotRefused(f"{robot.robot} has no camera, but the policy needs images.")
-    if has_waypoints and None in (robot.camera_pitch_deg, robot.camera_fovy_deg):
+    if has_waypoints and None in robot.camera_deg:
         raise RobotRefused(
             f"The profile of {robot.robot} does not state pitch_deg and fovy_deg of its camera, "
             "which waypoints need: measure them with `shapechanger robot camera`."

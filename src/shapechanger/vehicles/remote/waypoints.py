@@ -63,7 +63,7 @@ class RemoteWaypointEnv(WaypointView):
                     f"Waypoints need steering and throttle, but {welcome.robot} has {names}."
                 )
             sensors = ("speed", "yaw_rate")[: 1 + (self.response is None)]
-            camera = welcome.camera_pitch_deg, welcome.camera_fovy_deg, welcome.image_size
+            camera = *welcome.camera_deg, welcome.image_size
             on_the_spot = welcome.body == "tank"  # Only tracks turn a vehicle on the spot.
             self._see(
                 env, welcome.robot, camera, sensors, RobotRefused, turns_on_the_spot=on_the_spot
