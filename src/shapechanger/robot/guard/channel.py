@@ -17,8 +17,8 @@ import msgspec
 MAX_DATAGRAM: Final = 16 * 1024
 """Size of the largest datagram, bytes."""
 
-# Limits a round while the daemon sends as fast as the guard reads. Between rounds, the socket's
-# buffer is the limit.
+# Most datagrams that are read in one round, so that it ends although the daemon sends as fast as
+# the guard reads.
 _MOST_ORDERS_A_ROUND: Final = 1024
 
 
@@ -27,14 +27,15 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         kind: "command" moves; "halt" cancels the newest command and leaves the robot armed; "arm"
-            enables motion, and ends an emergency stop; "disarm" blocks motion; "emergency" stops
-            the robot until it is armed again; "end" ends the guard.
-        session: Number of the sender's lease of control; commands of an older lease are refused.
+            lets commands move the robot; "disarm" stops it until it is armed; "emergency" stops it
+            until a person arms it; "end" ends the guard.
+        session: Number of the sender's lease of control; a command is refused if one of a newer
+            lease arrived before it.
         seq: Sequence number of a command, which increases within a session.
         issued_ns: Time at which the daemon received the request, ns. Required for "command" and
             "arm", which are refused if they are old.
         ttl_ms: Longest time for which a command acts, counted from `issued_ns`, ms.
-        frame_ns: Time of the newest image, ns; None without a camera or an image.
+        frame_ns: For "command": time of the newest image, ns; None without a camera or an image.
         values: One finite number for each action.
         emergency: For "arm": number of emergency stops that the sender has seen; a newer stop stays
             in force.
@@ -59,20 +60,21 @@ class GuardState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         at_ns: Time of the report, ns.
-        armed: Whether commands move anything.
+        armed: Whether the robot is armed; otherwise commands move nothing.
         emergency: Whether an emergency stop is in force.
         emergencies: Number of emergency stops since the guard started; see `Order.emergency`.
-        stop_reason: Why the command is not applied; empty if it is.
+        stop_reason: Why no command is applied, or why its values are changed; otherwise empty.
         applied: Applied value of each action.
-        applied_session: `Order.session` of the applied command.
-        applied_seq: Sequence number of the applied command; None while the robot is at rest.
-        applied_ns: Time at which the applied command reached the outputs, ns; None at rest.
-        refused: Why the newest order was refused; empty if none was refused since the last state.
+        applied_session: `Order.session` of the applied command; 0 without one.
+        applied_seq: Sequence number of the applied command; None without one, as in a stop.
+        applied_ns: Time at which the applied command first reached the outputs, ns; None without.
+        refused: Why the last refused order was refused; empty without a refusal since the last
+            state that was sent.
         refused_seq: Sequence number of the refused command; None for other orders.
         outputs: Value of each output, -1 to 1.
         quantities: Sensor readings in SI units, keyed by name: "speed" m/s signed, "distance" m,
             "bump" 0 or 1, "battery" V, "yaw_rate" rad/s, "acceleration_x" m/s2, "temperature" C,
-            "stall" 0 or 1, "collision" 0 or 1; without quantities that are not measured.
+            "stall" 0 or 1, "collision" 0 or 1; without those neither measured nor estimated.
         sources: Source of each quantity: name of a sensor, or "estimated".
         bumps: Number of bumps since the guard started.
     """
@@ -138,7 +140,7 @@ class _Socket:
             self.lost = True
 
     def _send(self, data: bytes) -> bool:
-        """Send data, and return whether it fitted into the socket."""
+        """Send data; return False if the socket is full or the other process is lost."""
         try:
             self._socket.send(data)
         except BlockingIOError:
@@ -157,11 +159,11 @@ class DaemonChannel(_Socket):
         self._life: list[int] = []
 
     def filenos(self) -> list[int]:
-        """Return the descriptors of the socket and of the lifeline."""
+        """Return the descriptors of the socket and, once it has arrived, of the lifeline."""
         return [self._socket.fileno(), *self._life]
 
     def orders(self) -> tuple[list[Order], list[str]]:
-        """Return the orders that have arrived, and why each other datagram is invalid."""
+        """Return the orders that have arrived, and the error of each invalid datagram."""
         self._look()
         orders: list[Order] = []
         malformed: list[str] = []
@@ -188,7 +190,7 @@ class DaemonChannel(_Socket):
         return orders, malformed
 
     def send(self, state: GuardState) -> bool:
-        """Send a state, and return whether it fitted into the socket."""
+        """Send a state; return False if the socket is full or the daemon is lost."""
         return self._send(encode(state))
 
     def _watch(self, fd: int) -> None:
@@ -200,7 +202,7 @@ class DaemonChannel(_Socket):
         self._dead.register(fd, select.POLLIN)
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the socket and the lifeline."""
         self._socket.close()
         while self._life:
             os.close(self._life.pop())
@@ -225,7 +227,7 @@ class Heartbeat(_Socket):
         now_ns = time.monotonic_ns()
         if not self.lost and now_ns - self._beaten_ns >= self._period_ns:
             self._beaten_ns = now_ns
-            # A full socket means that the supervisor does not read, which does not stop the robot.
+            # If the supervisor does not read, the socket is full and the beat is lost.
             self._send(b".")
 
     def leave(self) -> int:

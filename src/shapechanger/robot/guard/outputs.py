@@ -28,9 +28,9 @@ def enable_device(pin: int, hardware: Hardware) -> Any:
 class Switches:
     """Enable pin and emergency stop button.
 
-    The enable pin feeds a one-shot that holds the enable line of the motors for some ticks after
-    each edge. When the edges end for any reason, even the death of both guard and supervisor, the
-    motors lose power.
+    Each edge of the enable pin triggers a one-shot, which keeps the enable line of the motors
+    active for some ticks. When the edges end for any reason, even the death of both guard and
+    supervisor, the motors on this line lose power.
     """
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
@@ -55,7 +55,7 @@ class Switches:
             self._enable.toggle()
 
     def close(self) -> None:
-        """Stop enabling the motors and release the pins."""
+        """Set the enable pin low and release both pins."""
         if self._enable is not None:
             self._enable.off()
         for device in (self._enable, self._button):
@@ -63,8 +63,8 @@ class Switches:
                 device.close()
 
 
-# Smaller deviations are ignored, because pulses are quantised: at 50 Hz, a step of a PCA9685 is 1 %
-# of a servo's range, and 5 % for a motor controller whose profile uses a fifth of that range.
+# Smaller deviations of a value, -1 to 1, are ignored, because pulses are quantised: at 50 Hz, a
+# step of a PCA9685 is 0.01 for a servo, and 0.05 for a controller with a fifth of its pulse range.
 _STEP: Final = 0.06
 
 
@@ -73,8 +73,9 @@ def estimated(
 ) -> tuple[tuple[float, ...], str]:
     """Estimate the applied actions of a robot from the values that its outputs have.
 
-    If an output of an action deviates, the action is computed from each output that only this
-    action moves, and the value farthest from rest is returned.
+    An action without a deviating output keeps its requested value. If one deviates, the action is
+    at rest if all its outputs are. Otherwise it is computed from each output that only this action
+    moves, and the value farthest from rest counts; without such an output, the requested value.
 
     Returns:
         One number for each action; and a text that explains each deviation, "" without any.
@@ -151,7 +152,7 @@ class OutputBank:
         return estimated(self._plan, actions, values, tuple(self.values.values()))
 
     def ready(self, alive: Callable[[], object]) -> str:
-        """Reset outputs that had a fault; return why one cannot be reset, or ""."""
+        """Reset servos on buses that had a fault; return why one cannot be reset, or ""."""
         try:
             for device in self._devices:
                 device.ready(alive)
@@ -182,7 +183,7 @@ class OutputBank:
         return failures
 
     def close(self, now_ns: int) -> list[str]:
-        """Put every output to rest and close it; return the failures."""
+        """Put every output to rest, unless all are released, and close it; return the failures."""
         # A released output must not be energised again.
         failures = [] if self.released else self.rest(now_ns)
         for output, driver in self._drivers:
@@ -203,9 +204,9 @@ def errors_noted(failures: list[str], source: str = "") -> Generator[None]:
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
-    """Put every output to rest by opening and closing it, independently of the others.
+    """Put every output to rest by opening and closing it, even if others fail; disable the motors.
 
-    No other process may have the outputs open.
+    Outputs that stop by themselves are skipped. No other process may have the outputs open.
 
     Returns:
         A description of each failure.
@@ -234,7 +235,7 @@ def preload(plan: GuardPlan, source: str) -> None:
         OUTPUTS[output.driver]
         if over := output.settings.get("over"):
             PULSES[over]
-    # A robot without pins may lack the libraries, which are imported when they are needed.
+    # A robot that does not need a library may lack it.
     libraries = ("gpiozero",)
     if source == REAL:
         libraries += ("shapechanger.robot.lgpio_pins", "gpiozero.pins.lgpio", "smbus2")

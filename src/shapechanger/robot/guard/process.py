@@ -1,10 +1,11 @@
 """Guard process: the only owner of a robot's outputs.
 
-The daemon requests, `shapechanger.robot.guard.rules.Rules` decides, and this loop writes. It ends,
-with all outputs at rest, on SIGTERM, on the order "end", when the supervisor dies, and on any
-internal error. The death of the daemon disarms the robot.
+The daemon requests, `shapechanger.robot.guard.rules.Rules` decides, and this loop writes. It ends
+on SIGTERM or SIGINT, on the order "end", when the supervisor dies, and on any internal error; first
+it puts to rest all outputs that are not released. The death of the daemon disarms the robot.
 
-Exit codes: 0 if it was asked to end or the supervisor died, 1 after an error.
+Exit codes: 0 if it was asked to end or the supervisor died; 1 after an error or if an output failed
+on closing, and only then an output may not be at rest.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.hardware import Hardware, connect
 
 _BEAT_S: Final = 0.01
-"""Interval between heartbeats, s of real time; a guard silent for `guard_silence_ms` is killed."""
+"""Least time between heartbeats, s; a guard silent for `guard_silence_ms` is killed."""
 
 _WAIT_S: Final = 0.01  # Longest wait in real time while a twin's clock is paused, s.
-_STATE_EVERY_NS: Final = 20_000_000  # At least 50 states per second.
+_STATE_EVERY_NS: Final = 20_000_000  # A state is sent so often even if nothing changes.
 _MOST_REASON_BYTES: Final = 1000  # Several reasons may be joined; a datagram holds 16 kB.
 
 
@@ -69,7 +70,7 @@ class Guard:
             undo.callback(self._switches.close)
             self._sensors = Sensors(plan, hardware)
             undo.callback(self._sensors.close)
-            # Called first on closing, because closing the pins takes time.
+            # Runs before the devices are closed, because closing the pins takes time.
             undo.callback(self._rest_outputs)
             self._opened = undo.pop_all()
         self._rules = Rules(plan, now_ns)
@@ -86,12 +87,12 @@ class Guard:
         self._sent: GuardState | None = None
         self._logged = ""
         self.is_safe = True
-        """Whether all outputs were at rest on closing."""
+        """False if an output failed on closing, which may not be at rest."""
         self.ended = ""
         """Reason for ending; empty while the guard runs."""
 
     def run(self, heartbeat: Heartbeat) -> None:
-        """Run until asked to end, with a heartbeat to the supervisor."""
+        """Run until asked to end or the supervisor dies, and send heartbeats to it."""
         self._heartbeat = heartbeat
         self._clock.keep_alive(heartbeat.beat)
         until_ns = self._clock.now_ns()
@@ -111,7 +112,7 @@ class Guard:
         self.ended = self.ended or f"ended by {signal.Signals(number).name}"
 
     def close(self) -> None:
-        """Put all outputs to rest and release everything."""
+        """Put all outputs to rest, unless they are released, and close all devices."""
         self._opened.close()
 
     def _rest_outputs(self) -> None:
@@ -130,7 +131,7 @@ class Guard:
             self._next_tick_ns = max(self._next_tick_ns, now_ns - self._period_ns)
             self._next_tick_ns += self._period_ns
             if self._applied[1] is not None and self._rules.stands(now_ns):
-                self._apply(now_ns)  # Stops do not wait for sensors.
+                self._apply(now_ns)  # A stop that is due does not wait for the sensors.
             self._sense(now_ns)
         now_ns = self._clock.now_ns()  # Reading orders and sensors took time.
         decision = self._apply(now_ns)
@@ -140,12 +141,12 @@ class Guard:
         return min(self._next_tick_ns, self._rules.next_wake_ns(now_ns))
 
     def _feed(self) -> None:
-        """Feed the enable line while all outputs obey."""
+        """Toggle the enable pin while all outputs obey."""
         if self._healthy:
             self._switches.toggle()
 
     def _stay_alive(self) -> None:
-        """Feed the enable line and send a heartbeat during a long round."""
+        """Toggle the enable pin and send a heartbeat during a long round."""
         self._feed()
         if self._heartbeat is not None:
             self._heartbeat.beat()
@@ -161,7 +162,7 @@ class Guard:
             if order.kind == "end":
                 self.ended = "the daemon ended it"
         if malformed:
-            self._rules.halt()  # The malformed order may have replaced the previous command.
+            self._rules.halt()  # The invalid order may have been meant to replace the command.
             self._malformed += len(malformed)
             self._refused = (malformed[-1], None)
             text = shortened(malformed[-1])
@@ -190,7 +191,7 @@ class Guard:
                 actions, text = self._outputs.write(decision.actions, now_ns)
                 self._rules.learn(actions)
                 reason = decision.stop_reason
-                if decision.seq is not None:  # At rest, a deviating output is only late.
+                if decision.seq is not None:  # In a stop, an output that deviates is only late.
                     reason = f"{reason} {text}".strip()
                 decision = replace(decision, actions=actions, stop_reason=reason)
         except Exception as error:  # After any error of a driver, the other outputs must rest.
@@ -202,7 +203,7 @@ class Guard:
         return decision
 
     def _recover(self, decision: OutputDecision, now_ns: int) -> OutputDecision:
-        """Put all outputs to rest, retrying until each of them obeys."""
+        """Put all outputs to rest; called in every round until each of them obeys."""
         failures = self._outputs.rest(now_ns)
         self._healthy = not failures
         if failures and not self._rules.emergency:
@@ -239,7 +240,7 @@ class Guard:
             self._log.info("%s", fact)
             self._logged = fact
         sent = self._sent
-        # Sent on any change, and otherwise before the next tick would be too late.
+        # Sent on any change, and otherwise if the next tick would be too late.
         is_news = (
             sent is None
             or now_ns + self._period_ns - sent.at_ns > _STATE_EVERY_NS

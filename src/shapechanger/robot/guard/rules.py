@@ -18,8 +18,8 @@ from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.guard.running import shortened
 from shapechanger.robot.guard.sensors import Sensing
 
-# Time for which a battery must be low or a CPU hot. A noisy reading, or the dip when a motor
-# starts, must not stop the robot.
+# Time for which a battery must be low or a CPU hot before the robot stops, s: a noisy reading, or
+# the dip when a motor starts, must not stop it.
 _BELIEVED_AFTER_S = 0.5
 
 
@@ -43,8 +43,8 @@ class Persistence:
 class RobotHealth:
     """Reasons to keep the whole robot at rest: failed sensors, low battery, high temperature.
 
-    A battery recovers as soon as the load is gone, so a low battery latches until the robot is
-    armed again.
+    Of the failed sensors, only slow ones and those that protect the robot count. A battery recovers
+    as soon as the load is gone, so a low one latches until the robot is armed while it is not low.
     """
 
     def __init__(self, plan: GuardPlan) -> None:
@@ -74,7 +74,7 @@ class RobotHealth:
         """Update with new sensor readings."""
         failing: list[str] = []
         for name, why in sensing.failures.items():
-            if name in sensing.slow:  # A slow sensor delays every stop, even if no reflex uses it.
+            if name in sensing.slow:  # A slow sensor delays stops, even if no reflex uses it.
                 failing.append(f"Sensor {name} delays the robot: {why}")
             elif name in self._protecting:
                 failing.append(f"Sensor {name} fails and cannot protect the robot: {why}")
@@ -97,7 +97,7 @@ class RobotHealth:
 _NS_PER_MS = 1_000_000
 _CLIPPED = "Clipped by the robot's caps."
 
-# Quantities of the sensors whose failure disarms the robot.
+# Quantities of the sensors whose failure disarms the robot; a slow one only stops it.
 _DISARMING = ("tendons", "joints")
 
 _ARM_WITHIN_NS = 1_000_000_000
@@ -108,7 +108,10 @@ FUTURE_NS = 50_000_000
 
 
 class Stopping:
-    """A stop: propulsion rests at once; other actions hold, ramp to rest and may be released."""
+    """A stop: propulsion rests at once; other actions hold, then ramp to rest.
+
+    The outputs may be released afterwards.
+    """
 
     def __init__(
         self, plan: StopPlan, actions: Sequence[ActionPlan], values: Sequence[float], since_ns: int
@@ -143,9 +146,9 @@ class OutputDecision:
     Attributes:
         actions: One number for each action.
         release: Whether the outputs are released instead of written.
-        stop_reason: Why the robot does not follow its command; empty when it does.
-        session: Session of the command that the robot follows.
-        seq: Sequence number of that command; None while the robot is at rest.
+        stop_reason: Why no command is followed, or why its values are changed; otherwise empty.
+        session: Session of the command that the robot follows; 0 without one.
+        seq: Sequence number of that command; None without one, as in a stop.
     """
 
     actions: tuple[float, ...]
@@ -162,7 +165,7 @@ class Rules:
     robot again.
 
     Attributes:
-        armed: Whether commands move anything.
+        armed: Whether the robot is armed; otherwise commands move nothing.
         emergency: Whether an emergency stop is in force.
         emergencies: Number of emergency stops.
         disarmed: Why the robot must not move; empty while armed.
@@ -233,13 +236,13 @@ class Rules:
         self._command = None
 
     def disarm(self, reason: str) -> None:
-        """Keep everything at rest until armed again; the reason of an emergency stop is kept."""
+        """Stop until armed again; the reason of an emergency stop is kept."""
         self._command, self.armed = None, False
         if not self.emergency:
             self.disarmed = _sentence("Disarmed", reason)
 
     def stop(self, reason: str) -> None:
-        """Latch an emergency stop. Each call counts; the first reason is kept."""
+        """Latch an emergency stop, and count it; while it lasts, the first reason is kept."""
         if not self.emergency:
             self.disarmed = _sentence("Emergency stop", reason)
         self._command, self.armed, self.emergency = None, False, True
@@ -261,7 +264,7 @@ class Rules:
         push = self._reflexes.propulsion.push(self._done)
         self._reflexes.sense(sensing.quantities, bool(sensing.silent), push, now_ns)
         self._health.sense(sensing, now_ns)
-        # A person has to inspect the robot and arm it again: faulty servos have released their
+        # The robot has to be inspected before it is armed again: faulty servos have released their
         # joints, and an encoder that responds intermittently has a loose magnet.
         for name in self._disarming:
             if name in sensing.failures and name not in sensing.slow and self.armed:
@@ -290,15 +293,15 @@ class Rules:
         return decision
 
     def stands(self, now_ns: int) -> bool:
-        """Return whether `tick` would keep the robot at rest now."""
+        """Return whether `tick` would stop the robot or keep it at rest now."""
         return self._reason(now_ns) != ""
 
     def learn(self, done: tuple[float, ...]) -> None:
-        """Update with the applied value of each action after `tick`."""
+        """Update with the value of each action that the outputs applied after `tick`."""
         self._done = done
 
     def next_wake_ns(self, now_ns: int) -> int:
-        """Return when `tick` is due even if nothing happens."""
+        """Return when `tick` is due even if nothing happens, ns."""
         times = [now_ns + self._period_ns]
         if self._command is not None:
             times.append(self._expiry_ns)
@@ -313,8 +316,8 @@ class Rules:
     def _offer_command(self, order: Order, now_ns: int) -> str:
         """Accept a command, or return why it is refused.
 
-        A command that is older than the newest one is refused even if the newest one was refused,
-        because the sender has superseded it.
+        A command must be newer than all earlier ones, also than those that were refused, because
+        the sender has superseded the older ones.
         """
         limit_ms = min(self._plan.limits.deadline_ms, order.ttl_ms)
         expiry_ns = min(order.issued_ns, now_ns) + limit_ms * _NS_PER_MS
@@ -357,7 +360,7 @@ class Rules:
         return ""
 
     def _reason(self, now_ns: int) -> str:
-        """Return why the newest command must not act, or an empty string."""
+        """Return why the robot must not move, or an empty string if its command may act."""
         if reason := self.disarmed or self._health.reason:
             return reason
         # The age of the newest frame is known only from a command, which contains the frame's time.

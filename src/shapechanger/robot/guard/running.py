@@ -1,8 +1,8 @@
 """Plan, log and priority of the processes of a robot.
 
 The command line checks a profile once, turns it into a `ServePlan` and starts the supervisor with
-it. Guard and supervisor log one line per event on standard error. The reader may be stalled, such
-as a stopped terminal or a full pipe; lines are then dropped and the robot continues.
+it. Guard and supervisor log one line per event on standard error. If its reader stops, such as a
+terminal, lines are dropped once it is full, and the robot continues.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class ServePlan:
         python: The interpreter that runs the processes.
         patience_ms: Lower bound on the silence after which guard and daemon are killed, ms; their
             own limits apply if they are longer. 0 on a robot, and on a twin in real time, whose
-            guard sends heartbeats while its board is delayed. The clock of other twins is paused
-            while the machine is busy or renders, and a guard that waits for the clock is alive.
+            guard sends heartbeats while its board is delayed. Above 0 on other twins: their clock
+            is paused while the machine is busy or renders, and a guard that waits is no failure.
     """
 
     guard: GuardPlan
@@ -54,12 +54,12 @@ class ServePlan:
 
     @property
     def guard_silence_ms(self) -> int:
-        """Silence after which the guard is killed, ms."""
+        """Silence after which a guard that has sent a heartbeat is killed, ms."""
         return max(self.patience_ms, self.guard.limits.deadline_ms)
 
     @property
     def daemon_silence_ms(self) -> int:
-        """Silence after which the daemon is killed, ms."""
+        """Silence after which a daemon that has sent a heartbeat is killed, ms."""
         return max(self.patience_ms, _DAEMON_SILENCE_MS)
 
 
@@ -115,8 +115,8 @@ _STDERR: Final = 2
 class _Lines(logging.Handler):
     """Write lines without blocking, and count those that are dropped; never raise.
 
-    The descriptor is shared with other processes, so it must not become O_NONBLOCK. A line is no
-    longer than a writable pipe accepts without blocking.
+    The descriptor is shared with other processes, so it must not become O_NONBLOCK. A line is cut
+    to the length that a writable pipe accepts without blocking.
     """
 
     def __init__(self, fd: int) -> None:
@@ -172,18 +172,17 @@ GUARD: Final = 5
 """Real-time priority of the guard."""
 
 SUPERVISOR: Final = 10
-"""Real-time priority of the supervisor, above the guard's, so that it can end a busy loop."""
+"""Real-time priority of the supervisor, above the guard's, so that it can kill a busy guard."""
 
 _NICENESS: Final = -10
-# Longest uninterrupted run of a real-time process, µs; the kernel then ends it (SIGXCPU) and the
-# supervisor restarts it. A round of the guard takes a few thousand µs.
+# Longest run of a real-time process without a blocking call, µs; the kernel then kills it
+# (SIGKILL), and the supervisor replaces a guard. A round of the guard takes a few thousand µs.
 _MOST_RUN_US: Final = 500_000
 
 
 def run_early() -> None:
-    """Raise this process above normal priority."""
-    # The systemd unit grants the permission. Without it, other busy processes delay this one a
-    # little.
+    """Raise this process above normal priority, if it has the permission."""
+    # The systemd unit grants it. Without it, other busy processes delay this one.
     with contextlib.suppress(PermissionError):
         os.nice(_NICENESS)
 
@@ -199,7 +198,7 @@ def run_normally(pid: int) -> None:
 
 
 def run_promptly(priority: int) -> None:
-    """Switch this process to real-time scheduling and freeze its objects out of garbage collection.
+    """Switch to real-time scheduling if permitted; exclude all present objects from collection.
 
     On a machine with fourteen busy processes, stops were up to 50 ms late when the guard merely had
     a better nice value. Child processes are not real-time.

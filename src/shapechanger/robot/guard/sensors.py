@@ -15,8 +15,8 @@ from shapechanger.robot.drivers.chip import SENSORS, SensorDriver
 from shapechanger.robot.hardware import Hardware
 
 # Rank of a reading: if several sensors measure a quantity, the reading of the highest rank is used,
-# such as the smaller speed, so that a turning track does not hide a stalled one. Quantities that
-# are not listed use the last reading.
+# such as the speed nearest to 0, so that a turning track does not hide a stalled one. Quantities
+# that are not listed use the last reading.
 _CAUTION: Final[dict[str, Callable[[float], float]]] = {
     "bump": operator.pos,
     "collision": operator.pos,
@@ -29,7 +29,7 @@ _CAUTION: Final[dict[str, Callable[[float], float]]] = {
 
 
 _ESTIMATED = "estimated"
-"""Source of a quantity that is estimated from the command."""
+"""Source of a speed that follows from the applied actions, and of a collision from a stall."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +38,10 @@ class Sensing:
 
     Attributes:
         quantities: Readings in SI units, keyed by name; see `GuardState.quantities`.
-        sources: Name of the sensor behind each quantity.
-        failures: Why a sensor did not respond, keyed by sensor.
-        slow: Failed sensors that took too long.
-        silent: Distance sensors that responded without a distance.
+        sources: Name of the sensor behind each quantity, or "estimated".
+        failures: Why a sensor failed, was slow or returned no finite value, keyed by its name.
+        slow: Names of the failed sensors that took too long.
+        silent: Names of the distance sensors that responded without a distance.
     """
 
     quantities: dict[str, float] = field(default_factory=dict[str, float])
@@ -76,11 +76,11 @@ class Sensing:
 
 
 _MOST_READ_NS: Final = 20_000_000
-"""Longest permitted response time of a sensor, ns: a slow sensor delays all stops."""
+"""Longest permitted response time of a sensor, ns: a slow sensor delays stops."""
 
 
 class Sensors:
-    """All sensors; a failed or slow one is reported without affecting the others."""
+    """All sensors; one that fails or is slow is reported, and the others are read."""
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
         self._clock = hardware.clock
@@ -96,7 +96,7 @@ class Sensors:
     def read(self, now_ns: int, direction: float) -> Sensing:
         """Read all sensors."""
         sensing = Sensing()
-        # A twin's clock is paused meanwhile, so that its runs are reproducible on any machine.
+        # A twin's clock is paused meanwhile, so its sensors are not slow on a slow machine.
         ended_ns = self._clock.now_ns()
         for name, driver in self._drivers:
             began_ns = ended_ns

@@ -2,12 +2,12 @@
 
 It is the parent of both and does nothing else, so that little can fail. A dead or silent guard
 cannot put the outputs to rest, and a Raspberry Pi keeps the levels of its pins; the supervisor then
-puts them to rest, retrying until they obey. It then restarts both processes, and the new guard
-starts in an emergency stop, which only a person can end.
+kills the guard and puts them to rest, retrying until they obey. It then restarts both processes,
+unless they fail too often; the new guard starts in an emergency stop, which only a person can end.
 
 Exit codes: 0 if asked to end (SIGTERM, SIGINT, SIGHUP, or an order "end" to the guard); 1 if the
-processes failed too often; 2 if it cannot start; 3 if, at its end, an output did not obey or a
-killed guard did not exit for some seconds. With all other codes, the outputs are at rest.
+processes failed too often; 2 if it cannot start, or after an error of its own; 3 if, at its end, an
+output did not obey or a killed guard did not exit for 5 s. After 0 or 1, all are at rest or off.
 """
 
 from __future__ import annotations
@@ -43,15 +43,14 @@ class Child:
     """A child process with a heartbeat.
 
     The process gets one end of a pair of sockets as `--heartbeat-fd`. When the supervisor dies for
-    any reason, the kernel closes the other end, and the process ends itself. PR_SET_PDEATHSIG is
-    not used, because a signal would kill the guard at once, whereas the end of the stream lets it
-    put its pins to rest.
+    any reason, the kernel closes the other end, and the process ends itself: a guard first puts its
+    outputs to rest.
 
     Attributes:
         name: Name of the process.
         beaten_ns: Time of the last heartbeat, or of the start before the first, ns.
         has_beaten: Whether there was a heartbeat.
-        killed: Whether SIGKILL was sent; a process stuck in the kernel does not exit.
+        killed: Whether SIGKILL was sent; a process stuck in the kernel may still exist.
     """
 
     def __init__(
@@ -85,7 +84,7 @@ class Child:
         return [self._heart.fileno(), self._pidfd]
 
     def is_gone(self, now_ns: int) -> bool:
-        """Read its heartbeats and return whether it has exited."""
+        """Read its heartbeats; return whether it has exited or closed its end of the stream."""
         beats: bytes | None = None
         try:
             beats = self._heart.recv(1 << 16)
@@ -118,7 +117,7 @@ class Child:
             self.kill(reap_s)
 
     def close(self) -> None:
-        """Close its descriptors; the process must have exited."""
+        """Close its descriptors."""
         self._heart.close()
         os.close(self._pidfd)
 
@@ -145,7 +144,7 @@ class Restarts:
         return _PAUSE_S * (2 ** (len(self._times_ns) - 1) - 1)
 
     def may_restart(self, now_ns: int) -> bool:
-        """Return whether another restart is permitted now, and count it."""
+        """Return whether another restart is permitted now; if so, count it."""
         self._times_ns = [t for t in self._times_ns if now_ns - t < self._within_ns]
         may = len(self._times_ns) < self._most
         if may:
@@ -158,13 +157,13 @@ _FAILED_TOO_OFTEN: Final = 1
 _CANNOT_START: Final = 2
 _NOT_SAFE: Final = 3
 
-# Time to the first heartbeat: a Pi Zero takes several seconds to load the daemon.
+# Longest wait for the first heartbeat, s: a Pi Zero takes several seconds to load the daemon.
 _START_S: Final = 30.0
-_END_S: Final = 1.0  # Time for a process to exit after SIGTERM.
-_REAP_S: Final = 0.05  # Longest wait for a killed process before the outputs are put to rest.
-_AGAIN_S: Final = 0.1  # Time between attempts to put the outputs to rest.
-_UNSAFE_S: Final = 5.0  # Time limit for such attempts when the supervisor is to end.
-_CHECK_S: Final = 0.02  # Time between checks of the heartbeats.
+_END_S: Final = 1.0  # Time for a daemon to exit after SIGTERM, s; a guard has its silence limit.
+_REAP_S: Final = 0.05  # Longest wait for a killed process before the outputs are put to rest, s.
+_AGAIN_S: Final = 0.1  # Time between attempts to put the outputs to rest, s.
+_UNSAFE_S: Final = 5.0  # Time limit for these if asked to end, or if no guard ever ran, s.
+_CHECK_S: Final = 0.02  # Longest time between checks of the heartbeats, s.
 # A longer gap between checks means that the supervisor itself did not run.
 _PAUSE_NS: Final = 100_000_000
 
@@ -187,7 +186,7 @@ class Supervisor:
             end.setblocking(False)
 
     def run(self) -> int:
-        """Run the processes until asked to end, and return the exit code."""
+        """Run the processes until asked to end or giving up, and return the exit code."""
         preload(self._plan.guard, self._plan.hardware[0])
         signal.set_wakeup_fd(self._waker.fileno(), warn_on_full_buffer=False)
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -270,7 +269,7 @@ class Supervisor:
         return self._end_reason
 
     def _stop(self, guard: Child, daemon: Child) -> None:
-        """End both children, the guard first, and leave the outputs at rest."""
+        """End both children, the guard first, and try to put the outputs to rest."""
         if not guard.killed and guard.is_gone(time.monotonic_ns()):
             guard.kill(_REAP_S)
             if guard.code == 0:
@@ -298,8 +297,7 @@ class Supervisor:
         """Put the outputs to rest, retrying until they obey and the guard has exited.
 
         A guard stuck in the kernel still holds its pins, and its system call may complete later.
-        After a request to end, or if no guard ever had the outputs, this gives up after some
-        seconds.
+        After a request to end, or if no guard ever sent a heartbeat, this gives up after 5 s.
         """
         self._failures = []
         started_ns = time.monotonic_ns()
