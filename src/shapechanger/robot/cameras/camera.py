@@ -109,7 +109,7 @@ class CameraPlan:
 
 
 class Camera:
-    """Source of frames. One thread may call `read`; any thread may `close`, which ends waits."""
+    """Source of frames. One thread may call `read`; any thread may `close`."""
 
     def __init__(self, plan: CameraPlan) -> None:
         self.plan = plan
@@ -122,7 +122,7 @@ class Camera:
         raise NotImplementedError
 
     def wait(self, fd: int | None = None, at_most_s: float | None = None) -> bool:
-        """Return True once a descriptor is readable, or False after `at_most_s` seconds."""
+        """Return True once `fd` is readable, False after `at_most_s` s; raise once it is closed."""
         poll = select.poll()
         for one in (self._woken,) if fd is None else (self._woken, fd):
             poll.register(one, select.POLLIN)
@@ -132,7 +132,7 @@ class Camera:
         return bool(ready)
 
     def pace(self) -> int:
-        """Wait until the next frame is due at the plan's rate; return that time: monotonic, ns.
+        """Wait until the next frame is due at the plan's rate; return the time then: monotonic, ns.
 
         A late frame is due at once. After a frame that is more than a period late, the schedule
         starts again.
@@ -144,7 +144,7 @@ class Camera:
         return now_ns
 
     def close(self) -> None:
-        """Close the camera; a `read` that waits in another thread raises an error."""
+        """Close the camera; a `wait` in another thread raises an error."""
         if not self._closed:
             self._closed = True
             os.write(self._wake, b"\0")

@@ -16,7 +16,7 @@ _MAX_JPEG: Final = 4 * 1024 * 1024
 """Size of the largest frame, bytes."""
 
 _MAX_SKIPPED: Final = 1 << 20
-"""Bytes without a frame after which a stream is invalid; enough for several lost frames."""
+"""Bytes without a frame after which a stream is invalid; several usual frames may be lost."""
 
 
 def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:

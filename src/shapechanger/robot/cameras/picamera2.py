@@ -1,7 +1,7 @@
 """Camera driver for the Raspberry Pi's camera over picamera2, a system package.
 
-Tested against a recording fake only, not on a camera. Sources: picamera2's code and manual (The
-Picamera2 Library, sections 4 and 6).
+Tested only against a fake that records calls, not on a camera. Sources: picamera2's code and manual
+(The Picamera2 Library, sections 4 and 6).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame
 from shapechanger.robot.cameras.jpeg import encoded_frame
 
-_SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
+_SILENT_S: Final = 2.0  # Longest wait for a frame, s: some stop silently (picamera2#1004).
 
 # The bytes of a pixel in "BGR888" are red, green, blue: the name has the order in a word.
 _FORMAT: Final = "BGR888"

@@ -28,7 +28,7 @@ from shapechanger.robot.cameras.jpeg import (
 
 _CHUNK: Final = 64 * 1024  # Bytes; the default capacity of a Linux pipe.
 _MOST_WAITING: Final = 1 << 20  # Bytes; the largest capacity of a pipe without privileges.
-_PROGRAM_ENDS_S: Final = 2.0
+_PROGRAM_ENDS_S: Final = 2.0  # Time for a program to exit after SIGTERM, s; then SIGKILL.
 _SUFFIXES: Final = (".jpg", ".jpeg")
 
 
@@ -36,9 +36,9 @@ class Pipe(Camera):
     """JPEG stream from a named pipe, a file or a program such as rpicam-vid; see `Camera`.
 
     A frame may have its time of capture in a comment segment (`captured_ns=`, monotonic). Otherwise
-    its time is the arrival of its last byte, which does not include the delay of the source. A
-    frame that waited in a pipe would look new, so all waiting frames are read, and the newest one
-    is returned. A file is read frame by frame.
+    its time is when it is read, which does not include the delay of the source. A frame without a
+    time that waited in a pipe would look new, so the waiting frames, up to 1 MiB, are read, and the
+    newest one is returned. A file is read frame by frame.
 
     Its setting is `path`: a pipe, a file, or a program with arguments after `|`.
     """
@@ -125,7 +125,7 @@ class Pipe(Camera):
 
 
 class Folder(Camera):
-    """Camera that replays the files of the folder `path` in the order of their names."""
+    """Camera that replays the JPEG files of the folder `path` by name, again and again."""
 
     def __init__(self, plan: CameraPlan) -> None:
         super().__init__(plan)

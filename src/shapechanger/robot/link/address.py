@@ -18,7 +18,7 @@ SERVICE: Final = "_shapechanger._tcp.local."
 """DNS-SD service type of robots."""
 
 _LABEL: Final = r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)"
-# Numbers and dots are an IPv4 address; names have at most 253 characters (RFC 1035).
+# Digits and dots alone are an IPv4 address; names have at most 253 characters (RFC 1035).
 _HOST_NAME: Final = re.compile(rf"(?=.{{1,253}}\Z)(?![0-9.]+\Z){_LABEL}(\.{_LABEL})*\.?")
 _PARTS: Final = re.compile(r"(?:\[([^\]]*)\]|([^:\[\]]*))(?::([0-9]{1,5}))?")
 
@@ -41,10 +41,10 @@ class Address:
 
 
 def parse_address(text: str) -> Address:
-    """Parse HOST, HOST:PORT, [IPv6] or [IPv6]:PORT.
+    """Parse HOST, HOST:PORT, IPv6, [IPv6] or [IPv6]:PORT.
 
     Raises:
-        LinkError: If the text has none of these forms.
+        LinkError: If the text has another form, or the port is not 1 to 65535.
     """
     text = text.strip()
     if _is_ip(text, 6):
@@ -62,7 +62,7 @@ def parse_address(text: str) -> Address:
 
 
 def is_loopback(host: str) -> bool:
-    """Return True if only this machine reaches the address of `host`."""
+    """Return True for "localhost" and loopback IP addresses, which only this machine reaches."""
     ip = _ip(host)
     return host == "localhost" if ip is None else ip.is_loopback
 

@@ -33,11 +33,11 @@ MAX_EPISODES: Final = 200
 """Most episodes in one `Recordings`; `Browse.before` asks for older ones."""
 
 Role = Literal["person", "program"]
-"""Kind of client. A person can take control from a program at once, a program from no client."""
+"""Kind of client. A person can take control from a program; a program only if no client has it."""
 
 Pace = Literal["realtime", "lockstep"]
-"""Pace: both sides follow their clocks, or the robot waits for a command and answers with the
-observation one control period later."""
+"""Pace: both sides follow their clocks ("realtime"), or the robot waits for a command and answers
+with the observation one control period later ("lockstep")."""
 
 _M = TypeVar("_M")
 
@@ -55,7 +55,7 @@ class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_
     """A message of either side."""
 
     def __repr__(self) -> str:
-        """Show only the number of bytes, to keep frames and proofs out of logs."""
+        """Show only the length of fields of bytes, to keep frames and proofs out of logs."""
         fields = (
             f"{name}=<{len(value)} bytes>" if isinstance(value, bytes) else f"{name}={value!r}"
             for name, value in msgspec.structs.asdict(self).items()
@@ -88,7 +88,7 @@ class Hello(ClientMessage, frozen=True):
 
 
 class Command(ClientMessage, frozen=True):
-    """Values for the outputs, in force until the next command or until they expire.
+    """Values of the actions, in force until the next command or until they expire.
 
     Attributes:
         seq: Number of the command, larger than the one before.
@@ -170,8 +170,8 @@ class Suggest(ClientMessage, frozen=True):
 class Record(ClientMessage, frozen=True):
     """Begin or end of an episode on the robot's disk; only from a person.
 
-    Answered by `RecorderState` to all clients, or by `Refused`. Commands of any client are
-    recorded while the robot is armed. The episode ends when the last person disconnects.
+    Answered by `RecorderState` to all clients, or by `Refused`. Commands of the client in control
+    are recorded while the robot is armed. The episode ends when the last person disconnects.
 
     Attributes:
         on: Whether to record.
@@ -296,20 +296,20 @@ class Observation(RobotMessage, frozen=True):
 
     Attributes:
         seq: Number of the observation, larger than the one before.
-        captured_ns: Capture time of the frame; without a camera, `state_ns`.
+        captured_ns: Capture time of the newest frame; without a frame, `state_ns`.
         state_ns: Time at which the state was read.
         sent_ns: Time at which the observation was sent.
-        frame: The frame as JPEG; None if the newest one was sent already.
+        frame: The newest frame as JPEG; None without one, if sent before, or if not requested.
         frame_seq: Number of the frame; equal numbers mean the same frame. 0 for none yet.
         state: Numbers of the state layout.
         sources: Source of each quantity: name of the sensor, "estimated" or "absent".
-        action_applied: Applied outputs, in the order and units of the command, after caps, slew
+        action_applied: Applied actions, in the order and units of the command, after caps, slew
             and reflexes.
-        applied_seq: `seq` of the applied command; None while the robot rests without a command.
+        applied_seq: `seq` of the applied command; None if no command of this control is applied.
         applied_ns: Time at which that command reached the outputs.
         command_ns: Time at which that command arrived.
-        stop_reason: Reason why the robot does not follow the command, a sentence; "" if it does.
-        armed: Whether the outputs may move.
+        stop_reason: Why no command is applied, or why its values are changed; "" otherwise.
+        armed: Whether the robot is armed; otherwise commands move nothing.
         emergency: Whether an emergency stop is in force.
         emergencies: Number of emergency stops since the robot's start.
         holder: Name of the client in control; "" for none.
