@@ -35,7 +35,7 @@ _MAGNET_DETECTED: Final = 0x20
 _TOO_WEAK: Final = 0x10
 _TOO_STRONG: Final = 0x08
 
-# Consecutive missed readings of a joint before the sensor fails, as for a servo on the servo bus:
+# Consecutive missed readings of a joint at which the sensor fails, as for a servo on its bus:
 # 50 ms of a guard's ticks. Chosen so that one disturbed transfer does not release a finger.
 _MOST_MISSED: Final = 5
 
@@ -89,7 +89,7 @@ class As5600Keys(chip.Keys, frozen=True, kw_only=True):
 
 
 Magnet = Literal["", "gone", "weak", "strong"]
-"""State of the magnet: in order (""), missing, too weak or too strong."""
+"""State of the magnet: "" if it is in order, missing ("gone"), too weak or too strong."""
 
 
 class As5600(chip.I2cDevice):
@@ -103,7 +103,7 @@ class As5600(chip.I2cDevice):
         self._missed = dict.fromkeys(keys.rows, 0)
 
     def measure(self, joint: str) -> tuple[int, Magnet]:
-        """Read the raw angle of one joint, 0 to 4095; it is meaningless without a magnet."""
+        """Read one joint: raw angle, 0 to 4095, meaningless without a magnet; and the magnet."""
         channel = self.joints[joint].channel
         with chip.device_errors(self.name):
             self._bus.write_byte(self._address, 1 << channel)
@@ -115,7 +115,7 @@ class As5600(chip.I2cDevice):
         return (high << 8 | low) % COUNTS_PER_TURN, magnet
 
     def counts(self, joint: str) -> int:
-        """Return the raw angle of one joint, 0 to 4095."""
+        """Return the raw angle of one joint, 0 to 4095; raise RobotError without a magnet."""
         counts, magnet = self.measure(joint)
         if magnet == "gone":
             channel = self.joints[joint].channel
@@ -125,7 +125,7 @@ class As5600(chip.I2cDevice):
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return each joint's angle, such as `MCP_flexion/angle`, rad, -pi to pi around its zero.
 
-        Joints without a reading are omitted. Several missing readings in a row raise RobotError.
+        Joints without a reading are omitted; the fifth miss of a joint in a row raises RobotError.
         """
         said: dict[str, float] = {}
         failures: dict[str, None] = {}  # A missing multiplexer is reported once.

@@ -128,7 +128,7 @@ def i2c_claims(bus: int, key: str, address: int, group: str = "") -> Iterator[Cl
 
 @contextmanager
 def device_errors(device: str) -> Generator[None]:
-    """Turn the errors of gpiozero, lgpio and the kernel into a `RobotError` about a device."""
+    """Turn the errors of imports, gpiozero, lgpio and the kernel into a `RobotError`."""
     try:
         yield
     except _kinds() as error:
@@ -139,7 +139,7 @@ def device_errors(device: str) -> Generator[None]:
 
 
 def _kinds() -> tuple[type[BaseException], ...]:
-    """Return the errors of the kernel, and of gpiozero and lgpio if they are loaded."""
+    """Return errors of the kernel and of imports, and of gpiozero and lgpio if they are loaded."""
     theirs = (("gpiozero", "GPIOZeroError"), ("lgpio", "error"))
     loaded = ((sys.modules.get(module), name) for module, name in theirs)
     return (OSError, ImportError, *(getattr(module, name) for module, name in loaded if module))
@@ -179,13 +179,13 @@ class OutputDriver(Protocol):
         """Write a value, and return the applied one.
 
         Args:
-            value: From -1, full left or backward, to 1, full right or forward; 0 is rest.
+            value: From -1, full left or backward, to 1, full right or forward; 0 is neutral.
             now_ns: Monotonic time, ns, for controllers with sequences.
         """
         ...
 
     def release(self) -> None:
-        """Release the output: no torque, no pulse."""
+        """Release the output: no pulses, and no torque unless its driver can only brake."""
 
     def close(self) -> None:
         """Set the safest level and close the pins."""

@@ -17,7 +17,7 @@ class CpuTemperatureKeys(Keys, frozen=True, kw_only=True):
     """Keys of the CPU's temperature.
 
     Attributes:
-        path: File of the kernel.
+        path: File of the kernel with the temperature, thousandths of a degree Celsius.
     """
 
     path: FilePath = "/sys/class/thermal/thermal_zone0/temp"
@@ -33,7 +33,7 @@ class CpuTemperature:
         self._celsius = self._measure()
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Return the "temperature" in degrees Celsius, updated once a second."""
+        """Return the "temperature" in degrees Celsius, updated at most once a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
             self._celsius, self._read_ns = self._measure(), now_ns
         return {"temperature": self._celsius}

@@ -19,7 +19,7 @@ from shapechanger.robot.hardware import Hardware
 if TYPE_CHECKING:  # Only simulations need these.
     from shapechanger.contract.world import Readings, World
 
-# Time without an edge after which the speed is 0.
+# Time without an edge after which the speed is 0, s.
 _STANDS_AFTER_S: Final = 0.5
 
 # Levels of the channels, a and b, as the wheel rolls forward: a leads.
@@ -31,7 +31,7 @@ class EncoderKeys(Keys, frozen=True, kw_only=True):
 
     Attributes:
         a: Pin of its first channel.
-        b: Pin of its second channel; -1 without one: the command then gives the sign of the speed.
+        b: Pin of its second channel; -1 without one: the speed then has the sign of the propulsion.
         counts_per_turn: Rising edges of one channel for a turn of the wheel.
         wheel_m: Circumference of the wheel, m.
     """
@@ -57,7 +57,7 @@ class Encoder:
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         keys = EncoderKeys.of(plan.settings)
         self._two_channels = keys.b != NO_PIN
-        # Speeds are measured over whole counts, because the edges of a count are unevenly spaced.
+        # Speeds are measured over up to one count, because its edges are unevenly spaced.
         edges_per_count = len(_FORWARD) if self._two_channels else 1
         self._edge_m = keys.count_m / edges_per_count
         self._lock = threading.Lock()  # lgpio calls back from its own thread.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # Only simulations need these.
 
 _TRIGGER_NS: Final = 10_000  # A pulse of 10 µs starts a ping.
 _CYCLE_NS: Final = 60_000_000  # The user guide: at least 60 ms from ping to ping.
-_MOST_MISSED: Final = 3  # Pings without an echo before the sensor fails, about 200 ms.
+_MOST_MISSED: Final = 3  # The ping after so many without an echo fails, after about 200 ms.
 _SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for each degree.
 
 
@@ -103,8 +103,8 @@ class Hcsr04:
                 self._rise = None
 
 
-# A ping takes eight cycles of 40 kHz, and the echo line is high for as long as the sound travels,
-# at most 38 ms. The sensor measures 2 cm to 4 m.
+# The echo line rises `_PING_NS` after the trigger, and is high for as long as the sound travels, at
+# most 38 ms. The sensor measures 2 cm to 4 m.
 _PING_NS: Final = 450_000
 _NO_ECHO_NS: Final = 38_000_000
 _NEAREST_M: Final = 0.02

@@ -42,7 +42,7 @@ class Ina219(I2cDevice):
         self.write_registers(_CONFIGURATION, *_CONTINUOUS_32_V.to_bytes(2))
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Return the voltage of the "battery" in V, updated ten times a second."""
+        """Return the voltage of the "battery" in V, updated at most ten times a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
             word = int.from_bytes(self.read_registers(_BUS_VOLTAGE, 2))
             self._volts = (word >> _STATUS_BITS) * _V_PER_STEP

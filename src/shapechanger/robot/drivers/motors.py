@@ -144,7 +144,8 @@ class HBridge(_DutyMotor):
 
     One input turns the motor forward, the other backward, each with PWM. They are never on
     together: one is turned off before the other is turned on, and on a Pi `LowAtOncePin` makes that
-    immediate. Some boards have a third input that enables the bridge. A released motor coasts.
+    immediate. Some boards have a third input that enables the bridge. A released motor coasts, but
+    an L298N whose enable input is not connected brakes it.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:

@@ -1,7 +1,7 @@
 """Inertial sensor MPU-6050 over I2C.
 
 Registers: InvenSense, MPU-6000 and MPU-6050 register map and descriptions, RM-MPU-6000A, rev. 4.2.
-It is mounted with x forward, y left and z up.
+It must be mounted with x forward, y left and z up.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _M_PER_S2: Final = _STANDARD_GRAVITY / 8192.0  # 8192 LSB/g at 4 g.
 _RAD_PER_S: Final = math.radians(1.0) / 65.5  # 65.5 LSB/(deg/s) at 500 deg/s.
 
 # A gyroscope at rest reads up to 20 deg/s (product specification PS-MPU-6000A, "ZRO tolerance"), so
-# its zero is estimated by a slow filter while the robot is not commanded to move.
+# its zero is estimated by a slow filter while the robot is not propelled.
 _MOST_ZERO_RAD_PER_S: Final = math.radians(25.0)
 _ZERO_SHARE: Final = 0.02
 

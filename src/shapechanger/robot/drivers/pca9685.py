@@ -53,8 +53,8 @@ _STEPS: Final = 4096
 _FULL: Final = 0x1000  # Bit 4 of ON_H and OFF_H: always on, always off. Off wins.
 _WAKE_UP_S: Final = 0.0005  # 500 us at most until the oscillator is up (section 7.3.1.1).
 
-# Unchanged pulses are not rewritten; the chip is polled now and then, because it sleeps after a
-# short loss of power.
+# Unchanged pulses are not rewritten. After so many of them the chip is polled, because it sleeps
+# after a short loss of power.
 _UNCHANGED_PER_CHECK: Final = 50
 
 
@@ -131,7 +131,7 @@ class Pca9685(I2cDevice):
                     raise RobotError(f"{self.name} is asleep: it lost power for a moment.")
 
     def stop(self, channel: int) -> None:
-        """Stop the pulses of a channel; after the last one, disable the outputs."""
+        """Stop the pulses of a channel; if no other sends pulses, disable the outputs first."""
         self.steps[channel] = None
         with ExitStack() as stack:
             stack.callback(self._write, channel, _FULL)

@@ -47,7 +47,7 @@ class PulsedKeys(Keys, frozen=True, kw_only=True):
     hz: Annotated[int, Meta(ge=40, le=400)] = 50
 
     def __post_init__(self) -> None:
-        """Refuse an empty range of pulses, or a pulse that is longer than its period."""
+        """Refuse a width at 0 that is not between the others, or a pulse as long as its period."""
         first, middle, last = self._widths_us()
         low, high = sorted((first, last))
         if not low < middle < high:
@@ -107,7 +107,7 @@ LGPIO: Final = PulseSource(keys=_LgpioKeys, open=_PinChannel, pulse_us=_pulse_us
 
 
 _ROOT: Final = Path("/sys/class/pwm")
-_EXPORT_S: Final = 1.0  # udev takes a moment to assign a new channel to the group gpio.
+_EXPORT_S: Final = 1.0  # Longest wait until udev has assigned a new channel to the group gpio, s.
 
 
 class _SysfsKeys(Keys, frozen=True, kw_only=True):
@@ -247,7 +247,7 @@ class ServoDriver(_PulsedOutput):
         self._written_ns = 0
 
     def write(self, value: float, now_ns: int) -> float:
-        """Move towards a position at the permitted speed; see `OutputDriver.write`."""
+        """Move towards a position, limited in speed after the first; see `OutputDriver.write`."""
         value = min(max(value, -1.0), 1.0)
         if self._value is not None and math.isfinite(self._speed_per_s):
             most = self._speed_per_s * (now_ns - self._written_ns) / 1e9
@@ -280,8 +280,8 @@ class EscKeys(PulsedKeys, frozen=True, kw_only=True):
         neutral_us: Pulse width at rest.
         forward_us: Pulse width at full speed.
         arm_s: Time at neutral before the controller obeys, s.
-        reverse: "double" if the controller brakes at the first pulse backward and reverses at the
-            second, "none" if it cannot reverse.
+        reverse: "direct" if the controller reverses at once, "double" if it brakes at the first
+            pulse backward and reverses at the second, "none" if it cannot reverse.
         brake_ms: With "double": duration of the brake, and of the neutral after it, ms each.
     """
 
@@ -299,7 +299,7 @@ class Esc(_PulsedOutput):
 
     A controller arms after some time at neutral; until then, only neutral is sent. A car's
     controller brakes at the first pulse below neutral and reverses at the second, so `reverse`
-    "double" sends brake, neutral and reverse in sequence. Other pulses are sent at once.
+    "double" sends brake, neutral and reverse in sequence; with "none", backward becomes neutral.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
@@ -350,15 +350,15 @@ class Esc(_PulsedOutput):
         return applied if value else 0.0
 
 
-# A controller arms a little earlier than its driver expects.
+# Share of `arm_s` after which a simulated controller arms, a little before its driver expects it.
 _ARM_SHARE: Final = 0.8
 
 
 class SpeedController:
     """Hobby speed controller: converts the value of its pulses to the value of the motor.
 
-    With `reverse` "double", the first backward pulses after driving forward brake; backward pulses
-    after another neutral drive backward.
+    With `reverse` "double", the first backward pulses after arming or driving forward brake;
+    backward pulses after another neutral drive backward.
     """
 
     def __init__(self, plan: OutputPlan) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-if TYPE_CHECKING:  # This module needs NumPy, which a guard must not load.
+if TYPE_CHECKING:  # `world` needs NumPy, which a guard must not load.
     from shapechanger.contract.world import Readings
 
 

@@ -1,4 +1,4 @@
-"""Bus driver with seven healthy servos, by tensions and by lengths."""
+"""Bus driver: set-up, stops, tensions and lengths."""
 
 import pytest
 
@@ -163,7 +163,7 @@ def _rig(direction: int = 1) -> Rig:
 
 
 def test_servos_are_in_current_based_position_mode() -> None:
-    """Servos hold their position at first, and after a stop do not turn back to an old length."""
+    """After `hold`, the goal is the present position, so that no servo turns to an old length."""
     rig = _rig()
     for _ in range(2):
         for name in NAMES:
@@ -181,7 +181,7 @@ def test_servos_are_in_current_based_position_mode() -> None:
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_length_is_reached_in_either_direction(direction: int) -> None:
-    """Against springs of 300 N/m the spools stop within the friction of their gears."""
+    """Against springs of 300 N/m, the length is reached within 1 mm."""
     rig = _rig(direction)
     rig.run(20.0, 200, length=-0.01)
     assert rig.bus.reason == ""

@@ -35,7 +35,7 @@ _SNAPPED = (_breaks("snapped"), "has lost its tendon: it winds in at")
 _FAULTS: list[tuple[_Fault, str]] = [
     (_set("temperature", 68.0), "has 68 C, more than 65 C"),
     (_breaks("hot"), "switched itself off: it is overheated. Only a reboot"),
-    # Below the voltage limit of the servo, 3.5 V.
+    # Below the voltage limits of both families, 3.5 and 4 V.
     (_set("volts", 3.4), "switched itself off: its voltage is out of range"),
     (_breaks("overload"), "switched itself off: it is overloaded"),
     (_breaks("mute"), "does not answer, 5 cycles in a row"),
@@ -147,7 +147,7 @@ def test_a_servo_with_a_hardware_error_needs_a_reboot() -> None:
 
 
 def test_servos_stop_without_cycles() -> None:
-    """Servos release after 100 ms without a packet, and the next cycle reports the reason."""
+    """Servos stop after 100 ms without a packet, and one of the next four cycles says why."""
     rig = Rig().start()
     rig.run(10.0, 20)
     rig.line.advance(89_000_000)

@@ -1,8 +1,7 @@
 """Bus of servos that pull tendons, by current or by a limited position, and its drivers.
 
-The bus has no thread and never sleeps. The sensor runs one cycle of the bus per tick, which reads
-all servos. The outputs only request their tensions, which are sent in one packet once all of them
-are requested.
+The bus has no thread. The sensor runs one cycle of the bus per tick, which reads the servos. The
+outputs only request their tensions or lengths, which are sent together once all are requested.
 """
 
 from __future__ import annotations
@@ -29,27 +28,27 @@ if TYPE_CHECKING:  # The guard must not load this module.
 Mode = Literal["off", "held", "stopping", "silent"]
 """Mode of the bus.
 
-"off": no servo has torque. "held": servos pull the requested tensions. "stopping": tensions ramp
-down, then the servos release. "silent": nothing is sent any more, so that the watchdogs of the
-servos stop them, or the power switch stops servos without a watchdog.
+"off": no servo has torque. "held": servos pull as requested. "stopping": tensions ramp down, then
+the servos release. "silent": nothing is sent until `set_up`, so that the watchdogs of the servos
+stop them, or the power switch stops servos without a watchdog.
 """
 
-# One of these registers is read in each cycle, so a fault is detected within four cycles.
+# Each cycle reads the next of these registers, or the last one of servos that report an alert.
 _AUDITED: Final = ("mark", "torque_enable", "goal", "hardware_error")
 
 
 class ServoBus:
     """A bus of servos that pull tendons, which the guard drives through its outputs.
 
-    Without further cycles, the servos' own watchdogs stop them. Servos of a family without a
+    Without further packets, the servos' own watchdogs stop them. Servos of a family without a
     watchdog get their power from a switch that the guard triggers while it runs, so they are only
     set up when the robot is armed. If one of them cannot be released, `flush` and `let_go` raise
-    errors, so that the guard stops triggering the switch, until the power is cut.
+    errors for `cut_ms`, so that the guard stops triggering the switch and the power is cut.
 
     In one packet, each servo waits for the answer of the previous one, so a silent servo may
     silence all later ones. The first servo that is missing in a cycle becomes a suspect, and the
-    others are read once more without it. Suspects are read alone, one per cycle. So a cycle waits
-    for at most two timeouts.
+    missing ones after it are read once more. Suspects are read alone, one in each cycle in which
+    all others answer. So `_poll` waits for at most two timeouts.
     """
 
     def __init__(self, settings: BusSettings, hardware: Hardware) -> None:
@@ -60,7 +59,7 @@ class ServoBus:
         self.is_ready = False  # Whether `set_up` has succeeded.
         self._hardware = hardware
         self._opened = ExitStack()
-        self._suspects: list[int] = []  # Servos that did not answer when they were last read.
+        self._suspects: list[int] = []  # Servos that are read alone, because they did not answer.
         self._stopped_ns = 0
         self._silent_since_ns: int | None = None
         self._cycles = 0
@@ -85,7 +84,7 @@ class ServoBus:
         self._opened.callback(self._release_finally)
 
     def begin(self) -> None:
-        """Open the bus once all of its outputs are open, and set up servos that have power.
+        """Open the bus once all of its outputs are open; set up servos with a watchdog.
 
         The servos do not move.
         """
@@ -96,9 +95,9 @@ class ServoBus:
                 one.set_zero(knows_turns=True)
 
     def ready(self, alive: Callable[[], object] = lambda: None) -> None:
-        """Clear all faults before the robot is armed, without any motion; refuse if one persists.
+        """Clear all faults before the robot is armed, without torque; refuse if one persists.
 
-        `alive` triggers the enable line and the supervisor; it is called at least every 50 ms.
+        `alive` triggers the enable line and sends a heartbeat; it is called for each servo.
         """
         if self.reason or not self.is_ready:
             self.let_go()
@@ -114,7 +113,7 @@ class ServoBus:
             )
 
     def flush(self, *, grip: bool) -> None:
-        """Send the requested tensions and lengths; `grip` energises released servos again."""
+        """Send the requests, unless there is a fault; `grip` energises released servos first."""
         self._require_release()
         if self.reason:
             return  # The following cycles complete the stop.
@@ -179,7 +178,8 @@ class ServoBus:
     def hold(self) -> None:
         """Enable the torque of all servos, with zero tension until the first goal.
 
-        RobotError is raised if there is a fault, or a servo refuses; all torques are then off.
+        RobotError is raised if they are held already, there is a fault, or a servo refuses; after a
+        refusal, all are released.
         """
         if self.mode != "off" or self.reason or not self.is_ready:
             why = "they are held already." if self.is_ready else "they are not set up."
@@ -227,8 +227,8 @@ class ServoBus:
     def release(self) -> None:
         """Disable the torque of all servos at once.
 
-        If a servo does not confirm it twice, the bus falls silent, so that the watchdog of that
-        servo or the power switch stops it. `set_up` ends the silence.
+        If a servo confirms neither of two attempts, the bus falls silent, so that the watchdog of
+        that servo or the power switch stops it. `set_up` ends the silence.
         """
         holding = set(self.servos)
         with self._loss_noted():
@@ -294,7 +294,7 @@ class ServoBus:
         return [id_ for id_ in self.servos if id_ not in self._suspects]
 
     def _poll(self) -> dict[int, ServoReply]:
-        """Read the present values of all servos; those that did not answer are missing."""
+        """Read present values; servos that did not answer, or were not asked, are missing."""
         asked = self._trusted
         heard = self._read("present", asked)
         if missing := [id_ for id_ in asked if id_ not in heard]:
@@ -310,7 +310,7 @@ class ServoBus:
         return heard
 
     def _audit(self, heard: dict[int, ServoReply]) -> None:
-        """Read a register that reveals faults, and drop servos that may have restarted."""
+        """Read a register that reveals faults; drop servos that may have restarted unnoticed."""
         # A servo that did not answer may have lost power, and so the zero of its position.
         back = [one for one in heard if self.servos[one].missed]
         for one in set(back) - self._audit_register("mark", back):

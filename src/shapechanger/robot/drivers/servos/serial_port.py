@@ -36,8 +36,8 @@ _RX_TIMEOUT: Final = -3001
 class SerialServoPort(PortHandler):
     """The SDK's port, which sends instructions and receives replies; see `ServoPort`.
 
-    Its timeout is as short as the bus allows. The SDK itself busy-waits 34 ms for each missing
-    answer, by the wall clock, which is too long for a stop. The family determines the packets.
+    It waits for an answer for `answer_ms` and the time of its bytes. The SDK itself busy-waits 34
+    ms for each missing answer, by the wall clock, too long for a stop. The family sets the packets.
     """
 
     def __init__(self, settings: BusSettings) -> None:

@@ -56,7 +56,7 @@ _MOST_MISSED: Final = 5
 _BELIEVED_CYCLES: Final = 3
 # Margin below the model's temperature limit from which a servo is too hot, K.
 _MARGIN_C: Final = 5.0
-# A single wrong goal may have been lost, and is replaced by the next one.
+# Wrong goals in a row that make a fault: a single goal may be lost, and the next one replaces it.
 _MAX_WRONG_GOALS: Final = 2
 # Length from the zero, m, that a tendon cannot reach in an intact finger. Chosen: the longest
 # excursion of a finger's tendon is 42 mm.
@@ -141,7 +141,7 @@ class TendonServo:
         return end + left * (start - end)
 
     def find(self, name: str) -> int | None:
-        """Read a register; None if the servo does not answer, even after a retry."""
+        """Read a register; None if the servo does not answer in three attempts."""
         one = self._family[name]
         ask = partial(self.port.read, [self.settings.id], one.address, one.size)
         data = self._ask(ask, f"read its {one.name}")
@@ -294,7 +294,7 @@ class TendonServo:
             self._fail(f"has lost its tendon: {speed}")
 
     def _lasts(self, sign: str, is_wrong: bool, count: int) -> bool:
-        """Return whether a sign of a fault was seen in enough consecutive cycles."""
+        """Return whether a sign of a fault was seen in enough consecutive checks."""
         self._wrong[sign] = self._wrong[sign] + 1 if is_wrong else 0
         return self._wrong[sign] >= count
 

@@ -65,7 +65,7 @@ class Register(msgspec.Struct, frozen=True):
 class ServoFamily(msgspec.Struct, frozen=True):
     """A family of servos, which share registers and packets.
 
-    Its `registers` are keyed by purpose; registers under other keys only have a `value` to set.
+    Its `registers` are keyed by purpose, and set to their `value` if they have one. Some keys:
 
     - `mode`: Operating mode.
     - `most`: Limit of `goal`, in the EEPROM.
@@ -84,7 +84,7 @@ class ServoFamily(msgspec.Struct, frozen=True):
     # several servos. Addresses, lengths and checksums have 1 or 2 bytes.
     protocol: float
     most_id: int  # Highest id.
-    baud_rates: tuple[int, ...]  # Baud rates of servos and SDK.
+    baud_rates: tuple[int, ...]  # Baud rates of the servos; the SDK lacks 4.5 Mbaud.
     # Whether a servo stops by itself when its bus is silent. If false, a power switch must stop it,
     # and without power it loses its count of turns.
     has_watchdog: bool
@@ -193,8 +193,8 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
         homing_n: Tension for finding the zero, N.
         direction: 1 if rising positions wind the tendon in, -1 if they let it out.
         control: Control of its tendon.
-        longest_m: With control "length": length beyond the zero at the lowest command, m.
-        shortest_m: With control "length": length beyond the zero at the highest command, m.
+        longest_m: With control "length": length beyond the zero at a command just above 0, m.
+        shortest_m: With control "length": length beyond the zero at the largest command, m.
         zero: Position while the finger is straight, in counts of 1/4096 turn.
     """
 
@@ -266,7 +266,7 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
 
     @property
     def metre_per_count(self) -> float:
-        """Change of the tendon's length per count of position, m; negative if it winds in."""
+        """Change of the tendon's length per count, m; negative if rising counts wind it in."""
         return -self.direction * 2.0 * math.pi * self.spool_radius_m / COUNTS_PER_TURN
 
 
@@ -275,8 +275,8 @@ class ServoBusKeys(Keys, frozen=True, kw_only=True):
 
     Attributes:
         device: Serial device, such as "/dev/ttyUSB0".
-        baud: Baud rate; one that the SDK supports.
-        watchdog_ms: Silence after which the servos stop by themselves, ms.
+        baud: Baud rate; one that the servos and the SDK support.
+        watchdog_ms: Silence after which servos with a watchdog stop by themselves, ms.
         ramp_ms: Time in which a stop lowers the tensions to the pretension, ms.
         answer_ms: Time for the servos to start an answer, ms: one silent servo must delay the guard
             by less than the limit for sensors. The latency timer of an FTDI adapter must be less:

@@ -12,8 +12,8 @@ a rig:
 - A servo needs 0.3 s to start.
 - In a sync read, servos behind a silent one stay silent, the worst case.
 - With control of the length, the current is proportional to the error of the position, reaches the
-  stall current at 1/32 turn (5.1 times the stall current per rad), and is limited by the goal. In
-  `bam`, the STS3215 has 32 times 0.166, 5.3 per rad.
+  stall current at 1/32 turn (5.1 times the stall current per rad), and is limited by the goal.
+  `bam` has 5.3 (32 times 0.166) for the STS3215.
 - The goal of a Feetech servo limits the voltage, and with it the torque of a motor at rest.
 - A Feetech servo does not report which instructions it refuses, and refuses to write to its EEPROM
   while that is locked. After an overload it has no torque until its power is cycled.
@@ -42,7 +42,7 @@ a mass of more than 0.01 kg for a stable simulation in steps of 1 ms."""
 
 _COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
 
-# Heat, chosen without a source: a servo that stalls with half its current gets about 55
+# Heat, chosen without a source: an XL330 that stalls with half its stall current gets about 55
 # degrees warmer, with a time constant of two minutes.
 _ROOM_C: Final = 25.0
 _KELVIN_PER_WATT: Final = 30.0
@@ -108,9 +108,9 @@ class SimulatedMotor:
 ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
 """Faults of a servo.
 
-"mute": it obeys without answering. "deaf": it receives no instructions. "hot", "overload": it shuts
-itself off. "snapped": its tendon is permanently torn. "power": its power fails for a moment. ""
-repairs "mute", "deaf" and "hot".
+"mute": it obeys without answering. "deaf": it receives no instructions. "hot": it has 75 °C, which
+most models do not bear. "overload": it shuts itself off. "snapped": its tendon is permanently torn.
+"power": its power fails for a moment. "": not mute, not deaf and cool again.
 """
 
 _HOT_C: Final = 75.0
