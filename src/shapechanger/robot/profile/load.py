@@ -89,7 +89,7 @@ def profile_text(path: str | os.PathLike[str]) -> str:
 
 
 def _instead_of(path: Path) -> str:
-    """Return the end of a sentence about a missing profile: the nearest one, and all of them."""
+    """Return the end of a sentence about a missing profile: the nearest name, and up to 40."""
     known = dict.fromkeys(shipped_profiles(), " of Shapechanger")
     known |= {file.stem: f" in {path.parent}" for file in sorted(path.parent.glob(f"*{_SUFFIX}"))}
     close = difflib.get_close_matches(path.stem, known, n=1)
@@ -144,7 +144,7 @@ def write_profile(
 
     Raises:
         UnknownName: If there is no shipped profile or no camera of this name.
-        ProfileError: If the robot's name is invalid.
+        ProfileError: If the robot's name or `arming` is invalid.
         OutputError: If the file exists or cannot be written; no partial file is left.
     """
     path = Path(path)

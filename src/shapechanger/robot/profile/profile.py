@@ -17,9 +17,9 @@ from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.chip import SENSORS, Text
 
 _INF: Final = math.inf
-# Unit, smallest and largest value of each quantity in `GuardState.quantities`, in the order of the
-# state, and the kind of sensor that measures it (see `SensorPlan.measures`). The guard derives
-# stalls from a measured speed, and collisions from a bumper or a stall.
+# Unit, smallest and largest value of each quantity of the guard, in the order of the state (chips
+# may add others), and the kind of sensor that measures it (see `SensorPlan.measures`). The guard
+# derives stalls from a measured speed, and collisions from a bumper or a stall.
 QUANTITIES: Final = {
     "speed": ("m/s", -_INF, _INF, "speed"),
     "distance": ("m", 0.0, _INF, "distance"),
@@ -62,7 +62,7 @@ def _state_features(plan: GuardPlan) -> list[Feature]:
 
 
 def _tendon_spans(outputs: Sequence[OutputPlan]) -> dict[str, tuple[float, str]]:
-    """Return span and unit of each action that moves exactly one tendon.
+    """Return span and unit of each action that moves one tendon, without other actions or weights.
 
     The span is the rise of the tension, N, or the fall of the length, m, over the values 0 to 1.
     """
@@ -157,7 +157,7 @@ class Profile(GuardPlan, RobotTable, CommandTable):
 
     @property
     def turning(self) -> tuple[float, float] | None:
-        """Turn at full steering, rad/m and rad/s; None if not measured."""
+        """Turn at full steering, rad/m and rad/s; 0 if not measured, None if neither is."""
         if self.turn_deg_per_m is None and self.turn_deg_per_s is None:
             return None
         return math.radians(self.turn_deg_per_m or 0.0), math.radians(self.turn_deg_per_s or 0.0)

@@ -72,8 +72,8 @@ class EnableKeys(Keys, frozen=True, kw_only=True):
 
     Attributes:
         pin: Pin that the guard toggles.
-        hold_ms: Time for which the one-shot holds the enable line after an edge, ms. The guard
-            toggles the pin at each tick, every 10 ms, and may be a few ms late.
+        hold_ms: Time for which the one-shot keeps the enable line active after an edge, ms. The
+            guard toggles the pin at each tick, every 10 ms, and may be a few ms late.
     """
 
     pin: Pin
@@ -196,7 +196,7 @@ def _read_action(table: Table) -> ActionPlan:
 
 
 def _read_sensor(table: Table) -> SensorPlan:
-    """Read one sensor; the tables of its joints become `SensorPlan.rows`."""
+    """Read one sensor; the tables of its joints become its setting `rows`."""
     name, chip = table.place[-1], SENSORS[table.chosen("driver", SENSORS)]
     given: dict[str, Any] = {"name": name, "measures": chip.measures}
     if chip.rows is not None:
@@ -244,7 +244,7 @@ def _reset(root: Table, actions: Sequence[ActionPlan]) -> Iterator[ResetStep]:
 
 
 def _check_claims(root: Table) -> None:
-    """Refuse a pin, a channel or an address that two keys claim."""
+    """Refuse a pin, a channel or an address that two keys claim, unless their group shares it."""
     users: dict[str, tuple[Table, Claim]] = {}
     for table, claim in ((table, one) for table, keys in root.decoded for one in keys.claims()):
         before, earlier = users.setdefault(claim.resource, (table, claim))
@@ -288,7 +288,7 @@ _NEARLY_ZERO: Final = 1e-9
 
 
 def _check_mix(root: Table, profile: Profile) -> None:
-    """Refuse an output without actions, an action without outputs, and an output driven at rest."""
+    """Refuse a wrong or empty mix, an action without outputs, and an output that drives at rest."""
     rests = {action.name: action.rest for action in profile.actions}
     for output in profile.outputs:
         table = root.table("output", output.name)
@@ -313,7 +313,7 @@ def _check_mix(root: Table, profile: Profile) -> None:
 
 
 def _check_stop(root: Table, profile: Profile) -> None:
-    """Refuse a stop that holds or ramps an action that contributes to a propelling output."""
+    """Refuse a hold or ramp if an action that does not propel moves a propelling output."""
     held = [key for key in ("hold_ms", "ramp_ms") if getattr(profile.stop, key)]
     for output in (one for one in profile.outputs if held and _drives(profile, one)):
         for name in output.mix.keys() - _propelling(profile):
@@ -340,7 +340,7 @@ _LEAST_STALE_MS: Final = 50
 
 
 def _check_limits(root: Table, profile: Profile) -> Profile:
-    """Refuse limits that need a missing sensor, a missing camera, or a faster rate."""
+    """Refuse limits that need a missing sensor or camera, or a faster rate; add the camera's."""
     table, limits, camera = root.table("limits"), profile.limits, profile.camera
     if limits.deadline_ms * profile.control_hz < 1000:
         text = f"must be at least {1000 / profile.control_hz:.0f} ms, the time from one command "
