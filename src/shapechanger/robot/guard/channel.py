@@ -26,9 +26,9 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Request from the daemon to the guard, checked strictly when it is decoded.
 
     Attributes:
-        kind: "command" moves; "halt" cancels the newest command and leaves the robot armed; "arm"
-            lets commands move the robot; "disarm" stops it until it is armed; "emergency" stops it
-            until a person arms it; "end" ends the guard.
+        kind: "command" sets the actions; "halt" cancels the newest command and leaves the robot
+            armed; "arm" lets commands move the robot; "disarm" stops it until it is armed;
+            "emergency" stops it until a person arms it; "end" ends the guard.
         session: Number of the sender's lease of control; a command is refused if one of a newer
             lease arrived before it.
         seq: Sequence number of a command, which increases within a session.
@@ -63,16 +63,16 @@ class GuardState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         armed: Whether the robot is armed; otherwise commands move nothing.
         emergency: Whether an emergency stop is in force.
         emergencies: Number of emergency stops since the guard started; see `Order.emergency`.
-        stop_reason: Why no command is applied, or why its values are changed; otherwise empty.
+        stop_reason: Why no command is applied, or what changes it beyond slew and levels, or "".
         applied: Applied value of each action.
         applied_session: `Order.session` of the applied command; 0 without one.
         applied_seq: Sequence number of the applied command; None without one, as in a stop.
-        applied_ns: Time at which the applied command first reached the outputs, ns; None without.
+        applied_ns: Time at which the outputs first had the applied command, ns; None without one.
         refused: Why the last refused order was refused; empty without a refusal since the last
             state that was sent.
         refused_seq: Sequence number of the refused command; None for other orders.
         outputs: Value of each output, -1 to 1.
-        quantities: Sensor readings in SI units, keyed by name: "speed" m/s signed, "distance" m,
+        quantities: Sensor readings in SI units by name, such as "speed" m/s signed, "distance" m,
             "bump" 0 or 1, "battery" V, "yaw_rate" rad/s, "acceleration_x" m/s2, "temperature" C,
             "stall" 0 or 1, "collision" 0 or 1; without those neither measured nor estimated.
         sources: Source of each quantity: name of a sensor, or "estimated".

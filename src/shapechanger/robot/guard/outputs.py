@@ -204,7 +204,7 @@ def errors_noted(failures: list[str], source: str = "") -> Generator[None]:
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
-    """Put every output to rest by opening and closing it, even if others fail; disable the motors.
+    """Put outputs to rest by opening and closing them, even if others fail; set the enable pin low.
 
     Outputs that stop by themselves are skipped. No other process may have the outputs open.
 

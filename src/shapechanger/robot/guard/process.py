@@ -2,10 +2,10 @@
 
 The daemon requests, `shapechanger.robot.guard.rules.Rules` decides, and this loop writes. It ends
 on SIGTERM or SIGINT, on the order "end", when the supervisor dies, and on any internal error; first
-it puts to rest all outputs that are not released. The death of the daemon disarms the robot.
+it puts the outputs to rest, unless they are released. The death of the daemon disarms the robot.
 
-Exit codes: 0 if it was asked to end or the supervisor died; 1 after an error or if an output failed
-on closing, and only then an output may not be at rest.
+Exit codes: 0 if it was asked to end or the supervisor died, and no output failed on closing; 1
+otherwise, and only then may an output not be at rest.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _BEAT_S: Final = 0.01
 """Least time between heartbeats, s; a guard silent for `guard_silence_ms` is killed."""
 
 _WAIT_S: Final = 0.01  # Longest wait in real time while a twin's clock is paused, s.
-_STATE_EVERY_NS: Final = 20_000_000  # A state is sent so often even if nothing changes.
+_STATE_EVERY_NS: Final = 20_000_000  # Longest time between two states while ticks are on time.
 _MOST_REASON_BYTES: Final = 1000  # Several reasons may be joined; a datagram holds 16 kB.
 
 
@@ -87,7 +87,7 @@ class Guard:
         self._sent: GuardState | None = None
         self._logged = ""
         self.is_safe = True
-        """False if an output failed on closing, which may not be at rest."""
+        """False if an output failed on closing; it may not be at rest."""
         self.ended = ""
         """Reason for ending; empty while the guard runs."""
 

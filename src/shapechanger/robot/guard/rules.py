@@ -108,10 +108,7 @@ FUTURE_NS = 50_000_000
 
 
 class Stopping:
-    """A stop: propulsion rests at once; other actions hold, then ramp to rest.
-
-    The outputs may be released afterwards.
-    """
+    """A stop: propulsion rests at once; other actions hold, then ramp; outputs may be released."""
 
     def __init__(
         self, plan: StopPlan, actions: Sequence[ActionPlan], values: Sequence[float], since_ns: int
@@ -146,7 +143,7 @@ class OutputDecision:
     Attributes:
         actions: One number for each action.
         release: Whether the outputs are released instead of written.
-        stop_reason: Why no command is followed, or why its values are changed; otherwise empty.
+        stop_reason: Why no command is followed, or what changes it beyond slew and levels, or "".
         session: Session of the command that the robot follows; 0 without one.
         seq: Sequence number of that command; None without one, as in a stop.
     """

@@ -43,7 +43,7 @@ class ServePlan:
         patience_ms: Lower bound on the silence after which guard and daemon are killed, ms; their
             own limits apply if they are longer. 0 on a robot, and on a twin in real time, whose
             guard sends heartbeats while its board is delayed. Above 0 on other twins: their clock
-            is paused while the machine is busy or renders, and a guard that waits is no failure.
+            is paused while the machine is busy or renders, and a guard that waits for it is alive.
     """
 
     guard: GuardPlan
@@ -198,7 +198,7 @@ def run_normally(pid: int) -> None:
 
 
 def run_promptly(priority: int) -> None:
-    """Switch to real-time scheduling if permitted; exclude all present objects from collection.
+    """Switch to real-time scheduling if permitted; exempt present objects from garbage collection.
 
     On a machine with fourteen busy processes, stops were up to 50 ms late when the guard merely had
     a better nice value. Child processes are not real-time.

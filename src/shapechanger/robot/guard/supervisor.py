@@ -6,8 +6,9 @@ kills the guard and puts them to rest, retrying until they obey. It then restart
 unless they fail too often; the new guard starts in an emergency stop, which only a person can end.
 
 Exit codes: 0 if asked to end (SIGTERM, SIGINT, SIGHUP, or an order "end" to the guard); 1 if the
-processes failed too often; 2 if it cannot start, or after an error of its own; 3 if, at its end, an
-output did not obey or a killed guard did not exit for 5 s. After 0 or 1, all are at rest or off.
+processes failed too often; 2 if it cannot start, or after its own error; 3 if, at its end, an
+output did not obey or a killed guard did not exit for 5 s. After 0 and 1, the outputs are at rest
+or released.
 """
 
 from __future__ import annotations
@@ -159,10 +160,10 @@ _NOT_SAFE: Final = 3
 
 # Longest wait for the first heartbeat, s: a Pi Zero takes several seconds to load the daemon.
 _START_S: Final = 30.0
-_END_S: Final = 1.0  # Time for a daemon to exit after SIGTERM, s; a guard has its silence limit.
+_END_S: Final = 1.0  # Time to exit after SIGTERM, s; a supervised guard has its silence limit.
 _REAP_S: Final = 0.05  # Longest wait for a killed process before the outputs are put to rest, s.
 _AGAIN_S: Final = 0.1  # Time between attempts to put the outputs to rest, s.
-_UNSAFE_S: Final = 5.0  # Time limit for these if asked to end, or if no guard ever ran, s.
+_UNSAFE_S: Final = 5.0  # Time limit for these if asked to end or no guard ever sent a heartbeat, s.
 _CHECK_S: Final = 0.02  # Longest time between checks of the heartbeats, s.
 # A longer gap between checks means that the supervisor itself did not run.
 _PAUSE_NS: Final = 100_000_000
@@ -186,7 +187,7 @@ class Supervisor:
             end.setblocking(False)
 
     def run(self) -> int:
-        """Run the processes until asked to end or giving up, and return the exit code."""
+        """Run the processes until asked to end, or until giving up; return the exit code."""
         preload(self._plan.guard, self._plan.hardware[0])
         signal.set_wakeup_fd(self._waker.fileno(), warn_on_full_buffer=False)
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
