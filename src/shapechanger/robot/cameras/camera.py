@@ -122,7 +122,7 @@ class Camera:
         raise NotImplementedError
 
     def wait(self, fd: int | None = None, at_most_s: float | None = None) -> bool:
-        """Return True once `fd` is readable, False after `at_most_s` s; raise once it is closed."""
+        """Return True once `fd` is readable, or False after `at_most_s` s; raise if closed."""
         poll = select.poll()
         for one in (self._woken,) if fd is None else (self._woken, fd):
             poll.register(one, select.POLLIN)

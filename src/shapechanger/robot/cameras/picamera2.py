@@ -14,7 +14,7 @@ from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame
 from shapechanger.robot.cameras.jpeg import encoded_frame
 
-_SILENT_S: Final = 2.0  # Longest wait for a frame, s: some stop silently (picamera2#1004).
+_SILENT_S: Final = 2.0  # Longest wait for a frame, s: some cameras stop silently (picamera2#1004).
 
 # The bytes of a pixel in "BGR888" are red, green, blue: the name has the order in a word.
 _FORMAT: Final = "BGR888"

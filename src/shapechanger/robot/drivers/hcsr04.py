@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # Only simulations need these.
 
 _TRIGGER_NS: Final = 10_000  # A pulse of 10 µs starts a ping.
 _CYCLE_NS: Final = 60_000_000  # The user guide: at least 60 ms from ping to ping.
-_MOST_MISSED: Final = 3  # The ping after so many without an echo fails, after about 200 ms.
+_MOST_MISSED: Final = 3  # Pings without an echo after which the next one fails, about 200 ms.
 _SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for each degree.
 
 

@@ -36,7 +36,7 @@ def _in_groups(data: bytes) -> str:
 
 
 def parse_key(text: str) -> bytes:
-    """Return the bytes of a key; hyphens, spaces, letter case, and 0, 1, 8 for O, I, B are allowed.
+    """Return the bytes of a key; hyphens, spaces, either case and 0, 1, 8 for O, I, B are accepted.
 
     Raises:
         LinkError: If the text is not a key.

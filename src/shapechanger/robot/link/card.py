@@ -37,7 +37,7 @@ class RobotCard(msgspec.Struct, frozen=True, kw_only=True):
             for none.
         arming: Who may arm the robot.
         clock: Source of the robot's time.
-        turning: Turn at full steering, rad/m and rad/s; 0 if not measured, None if neither is.
+        turning: Turn at full steering, rad/m and rad/s; 0 if one is not measured, None if neither.
     """
 
     robot: Annotated[str, Meta(min_length=1, max_length=64)]

@@ -308,7 +308,7 @@ class Observation(RobotMessage, frozen=True):
         applied_seq: `seq` of the applied command; None if no command of this control is applied.
         applied_ns: Time at which that command reached the outputs.
         command_ns: Time at which that command arrived.
-        stop_reason: Why no command is applied, or why its values are changed; "" otherwise.
+        stop_reason: Why no command is applied, or what changes it beyond slew and levels, or "".
         armed: Whether the robot is armed; otherwise commands move nothing.
         emergency: Whether an emergency stop is in force.
         emergencies: Number of emergency stops since the robot's start.

@@ -157,7 +157,7 @@ class Profile(GuardPlan, RobotTable, CommandTable):
 
     @property
     def turning(self) -> tuple[float, float] | None:
-        """Turn at full steering, rad/m and rad/s; 0 if not measured, None if neither is."""
+        """Turn at full steering, rad/m and rad/s; 0 if one is not measured, None if neither is."""
         if self.turn_deg_per_m is None and self.turn_deg_per_s is None:
             return None
         return math.radians(self.turn_deg_per_m or 0.0), math.radians(self.turn_deg_per_s or 0.0)

@@ -33,7 +33,7 @@ the servos release. "silent": nothing is sent until `set_up`, so that the watchd
 stop them, or the power switch stops servos without a watchdog.
 """
 
-# Each cycle reads the next of these registers, or the last one of servos that report an alert.
+# Each cycle reads the next one of these registers; if servos report an alert, their last one.
 _AUDITED: Final = ("mark", "torque_enable", "goal", "hardware_error")
 
 
