@@ -15,7 +15,7 @@ _values = st.floats(-1.0, 1.0)
 
 @given(value=_values, start=st.floats(0.0, 0.5), full=st.floats(0.6, 1.0))
 def test_duty_round_trips_within_a_step(value: float, start: float, full: float) -> None:
-    """Every value above 0 starts the motor; duties are whole percents, as gpiozero truncates."""
+    """Every value but 0 starts the motor; duties are whole percents, as gpiozero truncates."""
     duty = Duty(start, full)
     size = duty.of(value)
     assert duty.size_at(size) == pytest.approx(abs(value), abs=0.011 / (full - start))

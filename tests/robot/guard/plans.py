@@ -11,7 +11,7 @@ MS = 1_000_000
 
 
 def car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardPlan:
-    """A car with two motors: steering changes by at most 4 per second, throttle by 2."""
+    """A car with two motors: steering leaves rest by at most 4 per second, throttle by 2."""
     return GuardPlan(
         name="test car",
         actions=(

@@ -40,7 +40,7 @@ class Robot:
         until(lambda: any(line["duty"] > 0.0 for line in self.record.pins()))
 
     def kill(self, opened: str, number: signal.Signals) -> int:
-        """Signal the first guard ("hardware") or daemon, and return the time of the last record."""
+        """Signal the first guard ("hardware") or daemon; return the time of the line before."""
         before = self.record.lines()[-1]["t"]
         os.kill(self.pids(opened)[0], number)
         return before
@@ -94,7 +94,7 @@ def running(folder: Path, plan: GuardPlan | None = None, **daemon: object) -> It
         if process.poll() is None:
             process.kill()
             process.wait()
-        # Guard and daemon exit without their supervisor, unless they are stopped.
+        # Guard and daemon exit without their supervisor, unless a SIGSTOP still holds them.
         for pid in robot.pids("hardware") + robot.pids("daemon"):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGCONT)

@@ -1,8 +1,8 @@
-"""Stand-in for the daemon: arms, and commands half throttle 100 times a second.
+"""Stand-in for the daemon: arms, and commands half steering and throttle 100 times a second.
 
-It appends its actions to the record named in its part of the plan. With `commands`, it stops after
+It appends its actions to the record named in its part of the plan. With `commands`, it sends only
 that many commands; with `ends`, it then ends the guard. Only the first daemon of a record drives;
-later ones send heartbeats and wait.
+later ones only send heartbeats.
 """
 
 import contextlib

@@ -164,7 +164,7 @@ def _sensor(*readings: dict[str, float] | Exception) -> Mock:
     return sensor
 
 
-def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> None:
+def test_a_command_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> None:
     bench = make()
     bench.arms()
     bench.look(2, 249, 251)
@@ -191,7 +191,7 @@ def test_unchanged_states_are_sent_at_every_second_tick(make: _Make) -> None:
     assert {(s.applied_session, s.applied_ns) for s in bench.states} == {(0, None)}
 
 
-def test_each_output_is_written_once_a_tick(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_output_is_written_at_every_tick(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make()
     write = Mock(side_effect=lambda value, _: value)
     monkeypatch.setattr(bench.drivers["drive"], "write", write)
@@ -332,7 +332,7 @@ def test_outputs_that_are_not_ready_are_not_armed(
 def test_a_failed_output_stops_all_until_rearmed(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Until the output recovers, arming fails and the enable line is not toggled."""
+    """Until the output recovers, arming causes a new emergency stop; the enable pin rests."""
     bench = make(enable_pin=5)
     bench.arms()
     pin, edges = bench.factory.pin(5), list[int]()
@@ -440,7 +440,7 @@ def _slow(make: _Make, takes_ms: Callable[[float], int]) -> tuple[_Bench, list[t
 
 
 @pytest.mark.parametrize("takes_ms", [0, 15])
-def test_no_stop_waits_for_a_sensor(make: _Make, takes_ms: int) -> None:
+def test_a_stop_that_is_due_does_not_wait_for_a_sensor(make: _Make, takes_ms: int) -> None:
     """The guard decides with the time after the sensors were read."""
     bench, driven = _slow(make, lambda _: takes_ms)
     bench.run(320)

@@ -151,7 +151,7 @@ def test_an_action_that_rests_outside_its_caps_is_refused() -> None:
 
 
 def test_slew_limits_moves_away_from_rest_only() -> None:
-    """Values change by at most 2 a second, also after a pause, and change sign through rest."""
+    """Away from rest, by at most 2 a second and 0.04 a tick; a change of sign rests for a tick."""
     robot = _Armed(car())
     steps = ((10, 0.5, 0.02), (10, 0.5, 0.04), (5, 0.05, 0.05), (5, 0.01, 0.01))
     steps += ((10, -0.4, 0.0), (10, -0.4, -0.02), (10, 0.4, 0.0), (10_000, 0.6, 0.04))
@@ -372,7 +372,7 @@ def test_a_low_battery_and_a_hot_computer_stop_after_half_a_second(
         assert robot.tick().stop_reason == expected
 
 
-def test_a_low_battery_stops_until_it_is_full_and_armed_again() -> None:
+def test_a_low_battery_stops_until_it_has_recovered_and_is_armed() -> None:
     """A robot whose computer has cooled down need not be armed again."""
     robot = _driving(quick_car(_HEALTH))
     text = "The battery has 0.50 V, less than 0.8 V."
@@ -403,7 +403,7 @@ def test_a_low_battery_stops_until_it_is_full_and_armed_again() -> None:
     ],
 )
 def test_a_failed_protective_sensor_stops(name: str, limits: LimitPlan, stops: bool) -> None:
-    """A slow sensor stops the robot whatever it measures, because it delays every stop."""
+    """A slow sensor stops the robot whatever it measures, because it delays stops."""
     robot = _driving(quick_car(limits))
     text = f"Sensor {name} fails and cannot protect the robot: No answer."
     robot.rules.sense(Sensing(failures={name: "No answer."}), _T0)

@@ -25,7 +25,7 @@ from tests.robot.guard.plans import quick_car
         ("speed", (-0.01, 0.5), -0.01),
     ],
 )
-def test_the_order_of_sensors_does_not_matter(
+def test_the_most_cautious_reading_is_used(
     name: str, values: tuple[float, float], counts: float
 ) -> None:
     """Of equal readings the first one is used; of a quantity without a rank, the last reading."""

@@ -84,7 +84,7 @@ def test_a_fingerprint_round_trips(certificate: bytes) -> None:
 
 
 def test_an_invalid_fingerprint_is_an_error() -> None:
-    """A fingerprint has 64 hexadecimal digits; its short form has four groups of four letters."""
+    """A fingerprint has 64 hexadecimal digits; its short form, four groups of four characters."""
     short = fingerprint_short(fingerprint_of(b"certificate"))
     assert fingerprint_short(b"\x17".rjust(10, b"\0") + bytes(22)) == "AAAA-AAAA-AAAA-AAAX"
     assert [len(group) for group in short.split("-")] == [4, 4, 4, 4]

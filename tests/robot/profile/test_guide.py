@@ -39,7 +39,7 @@ def test_every_table_driver_and_profile_is_in_the_guide(guide: str) -> None:
     assert all(f"`{name}`" in guide for name in shipped_profiles())
 
 
-def test_every_message_is_on_the_wire() -> None:
+def test_every_message_is_in_the_guide_to_the_wire() -> None:
     page = with_keys((DOCS / "wire.md").read_text())
     for kind in (*ClientMessage.__subclasses__(), *RobotMessage.__subclasses__()):
         assert f"#### `{kind.__name__.lower()}`" in page

@@ -183,7 +183,7 @@ def test_a_change_that_breaks_the_profile_is_refused(
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("kind", ["car", "lab-car", "finger"])
 def test_a_new_profile_can_have_another_camera(kind: str, camera: str, tmp_path: Path) -> None:
-    """Size and rate are kept; settings of the shipped camera are removed."""
+    """The size and the rate of the frames are kept, and so are the outputs."""
     before = load_profile(shipped_profiles()[kind])
     profile = load_profile(write_profile(kind, tmp_path / "mine.toml", "mine", camera, "anyone"))
     assert profile.arming == "anyone"

@@ -149,14 +149,14 @@ _BARE = '[robot]\nname = "x"\nbody = "y"\n'
     ],
     ids=["empty", "bare", "output", "reset", "actions", "nested", "digits"],
 )
-def test_texts_without_the_tables_are_refused(text: str, message: str) -> None:
+def test_incomplete_and_unreadable_texts_are_refused(text: str, message: str) -> None:
     with pytest.raises(ProfileError, match=message):
         read(text)
 
 
 @pytest.mark.parametrize("key", ["hold_ms", "ramp_ms"])
 def test_a_stop_must_not_keep_the_robot_driving(key: str) -> None:
-    """A stop must not hold a propelling output, such as a track that mixes in steering."""
+    """A stop holds only actions that do not propel; none may move a propelling output (a track)."""
     tank = shipped_profiles()["tank"].read_text() + f"\n[stop]\n{key} = 100\n"
     read(tank)
     with pytest.raises(ProfileError, match=rf"{key} of \[stop\] would keep \[output.left\] driv"):

@@ -23,7 +23,7 @@ def values(plan: GuardPlan, actions: Sequence[float]) -> dict[str, float]:
     return dict(zip(names, output_values(plan, actions), strict=True))
 
 
-def test_every_body_has_a_profile() -> None:
+def test_every_shipped_profile_has_the_name_of_its_file() -> None:
     assert tuple(shipped_profiles()) == NAMES
     assert {name: plan.name for name, plan in PLANS.items()} == {name: name for name in NAMES}
 

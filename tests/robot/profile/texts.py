@@ -1,4 +1,4 @@
-"""A profile with every table, and helpers to change it."""
+"""A profile with every table but `[servo_bus]`, and helpers to change it."""
 
 import re
 from pathlib import Path
@@ -157,7 +157,7 @@ _LENGTH = 'control = "length"\nlongest_m = 0.012\nshortest_m = -0.03\n'
 
 
 def finger_text(family: str) -> str:
-    """Return the shipped finger with control of the lengths, and Feetech servos as in the guide."""
+    """Return the shipped finger with control of the lengths; for "Feetech" as in the guide."""
     text = shipped_profiles()["finger"].read_text()
     lines, enable = _LENGTH, ""
     if family == "Feetech":

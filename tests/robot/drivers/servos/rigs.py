@@ -159,7 +159,7 @@ class Rig(FakeHardware):
     def run(
         self, tension: float | None, cycles: int = 1, length: float | None = None, **others: float
     ) -> dict[str, dict[str, float]]:
-        """Request a tension, N, of each tendon, or its one in `others`; return the last readings."""
+        """Request a tension, N, of each tendon, but see `others`; return the last readings."""
         assert cycles > 0
         for _ in range(cycles):
             if tension is not None and self.bus.mode == "held":

@@ -174,10 +174,10 @@ def _see(one: TendonServo, mm_per_s: float, now_ms: int, length_mm: float = 0.0)
     return one.fault
 
 
-def test_a_slack_tendon_is_found() -> None:
-    """A tendon is slack after 100 ms above 140 mm/s, 70 % of the speed without load.
+def test_a_lost_tendon_is_detected() -> None:
+    """A tendon counts as lost after 100 ms above 140 mm/s, 70 % of the speed without load.
 
-    A tendon that is wound in further than the finger allows is slack at once.
+    A tendon that is wound in further than the finger allows counts as lost at once.
     """
     one = _one(servo("FDP"))
     speeds = [(500, 0), (-150, 0), (-150, 99), (-130, 100), (-150, 110), (-150, 209)]
