@@ -103,7 +103,7 @@ class As5600(chip.I2cDevice):
         self._missed = dict.fromkeys(keys.rows, 0)
 
     def measure(self, joint: str) -> tuple[int, Magnet]:
-        """Return the raw angle of a joint, 0 to 4095, valid only with a magnet; and its `Magnet`."""
+        """Return a joint's raw angle, 0 to 4095, valid only with a magnet; and its `Magnet`."""
         channel = self.joints[joint].channel
         with chip.device_errors(self.name):
             self._bus.write_byte(self._address, 1 << channel)

@@ -106,7 +106,7 @@ class Command(ClientMessage, frozen=True):
 
 
 class Acknowledge(ClientMessage, frozen=True):
-    """Request for the observation after number `seq`, without a command; 0 for the first."""
+    """Request for the next observation, without a command; `seq` is the newest one, 0 for none."""
 
     seq: _Sequence = 0
 
@@ -134,7 +134,7 @@ class Arm(ClientMessage, frozen=True):
 
 
 class Disarm(ClientMessage, frozen=True):
-    """Request to keep the outputs at rest."""
+    """Request to stop the robot until it is armed; from the client in control or a person."""
 
 
 class EmergencyStop(ClientMessage, frozen=True):
@@ -204,7 +204,7 @@ class Browse(ClientMessage, frozen=True):
 
 
 class Fetch(ClientMessage, frozen=True):
-    """Request for a `Piece` of an episode; until it has been sent, further requests are refused.
+    """Request for a `Piece`; until it is sent, `Browse`, `Fetch` and `Judge` are refused.
 
     Attributes:
         episode: Id of the episode.
@@ -305,7 +305,7 @@ class Observation(RobotMessage, frozen=True):
         sources: Source of each quantity: name of the sensor, "estimated" or "absent".
         action_applied: Applied actions, in the order and units of the command, after caps, slew
             and reflexes.
-        applied_seq: `seq` of the applied command; None if no command of this control is applied.
+        applied_seq: `seq` of the applied command; None if the client in control has none applied.
         applied_ns: Time at which that command reached the outputs.
         command_ns: Time at which that command arrived.
         stop_reason: Why no command is applied, or what changes it beyond slew and levels, or "".
