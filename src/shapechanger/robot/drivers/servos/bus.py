@@ -154,9 +154,8 @@ class ServoBus:
         self._send_no_torque()
         numbers: dict[str, int | None] = {}
         for one in self.servos.values():
-            alive()
             text = f"{one.settings.name} (id {one.settings.id})"
-            numbers[text] = one.find("model_number")
+            numbers[text] = one.find("model_number", alive)
         if missing := [text for text, number in numbers.items() if number is None]:
             there = ", ".join(text for text in numbers if text not in missing)
             bus = self._settings

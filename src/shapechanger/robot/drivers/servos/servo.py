@@ -140,11 +140,14 @@ class TendonServo:
         end = min(self.settings.pretension_n, start)  # A slack tendon is not pulled.
         return end + left * (start - end)
 
-    def find(self, name: str) -> int | None:
-        """Read a register; None if the servo does not answer in three attempts."""
+    def find(self, name: str, alive: Callable[[], object] = lambda: None) -> int | None:
+        """Read a register; None if the servo does not answer in three attempts.
+
+        `alive` is called before each attempt.
+        """
         one = self._family[name]
         ask = partial(self.port.read, [self.settings.id], one.address, one.size)
-        data = self._ask(ask, f"read its {one.name}")
+        data = self._ask(ask, f"read its {one.name}", alive)
         return None if data is None else one.decode(data)
 
     def read(self, name: str) -> int:
@@ -160,8 +163,14 @@ class TendonServo:
         if self._ask(ask, f"set its {one.name} to {value}") is None:
             raise RobotError(f"{self.settings.label} does not answer.")
 
-    def _ask(self, ask: Callable[[], Mapping[int, ServoReply]], doing: str) -> bytes | None:
+    def _ask(
+        self,
+        ask: Callable[[], Mapping[int, ServoReply]],
+        doing: str,
+        alive: Callable[[], object] = lambda: None,
+    ) -> bytes | None:
         for _ in range(_TRIES):
+            alive()
             if reply := ask().get(self.settings.id):
                 if number := reply.error & self._family.refused:
                     why = _REFUSALS.get(number, f"it gives the unknown reason {number}")
