@@ -15,7 +15,7 @@ from tests.transfer.body_map.bodies import ant_action, ant_observation
 
 
 class Recorder(gym.Env[np.ndarray, np.ndarray]):
-    """An env with given layouts that returns given observations and records its actions."""
+    """An env with the layouts of an ant, which records its actions."""
 
     def __init__(self, *, feet: bool = False) -> None:
         self.observation_layout = ant_observation(feet=feet)
@@ -72,7 +72,7 @@ def test_a_mapped_env_adapts_observations_and_actions() -> None:
 
 
 def test_a_space_of_the_wrong_size_is_refused() -> None:
-    """A map for other bodies is refused when the env is built."""
+    """Observations or actions of another size than the map's are refused when the env is built."""
     built = body_map(Recorder(), Recorder(feet=True))
     with pytest.raises(SpaceMismatch, match=r"target observation has 59 numbers"):
         MappedEnv(Recorder(), built)

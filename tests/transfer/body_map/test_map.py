@@ -47,7 +47,7 @@ def test_values_are_reordered_by_name() -> None:
     ("given", "result"),
     [(np.float32, np.float32), (np.float64, np.float64), (np.int64, np.float64)],
 )
-def test_batches_of_any_shape_and_type_are_accepted(given: type, result: type) -> None:
+def test_batches_of_floats_and_integers_keep_their_shape(given: type, result: type) -> None:
     values = np.random.default_rng(0).uniform(-9, 9, size=(4, 5, 2)).astype(given)
     adapted = small().adapt_observation(values)
     assert (adapted.shape, adapted.dtype) == ((4, 5, 3), result)
@@ -135,7 +135,7 @@ def test_entries_are_equal_if_they_do_the_same() -> None:
 
 
 def test_a_map_can_be_pickled() -> None:
-    """Pickling keeps the map, without its cached arrays."""
+    """A pickled and a copied map equal the original, and have the same arrays."""
     built = small()
     assert built.action_matrix.shape == (4, 2)
     for twin in (pickle.loads(pickle.dumps(built)), copy.deepcopy(built)):

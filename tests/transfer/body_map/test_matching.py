@@ -299,7 +299,7 @@ otherwise = { hold = 0.1 }
 """
 
 
-def test_a_person_can_write_a_map() -> None:
+def test_rules_are_read_from_toml() -> None:
     built = BodyMap.from_toml(EXAMPLE, *GROWN)
     rules = {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
     assert rules["torso/vx"] == Copy("torso/vx", 0.5)
@@ -322,7 +322,7 @@ def test_units_come_from_the_text() -> None:
 
 
 def test_exact_rules_are_not_checked() -> None:
-    """`units = "exact"` accepts scales of 1 between units and constants beyond the range."""
+    """`units = "exact"` accepts constants beyond the range."""
     text = 'units = "exact"\n[action]\n"foot_*/motor" = { hold = 3.0 }'
     built = BodyMap.from_toml(text, *GROWN)
     assert {e.rule for e in built.action if e.feature.startswith("foot")} == {Hold(3.0)}
@@ -364,7 +364,7 @@ def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -
     ],
 )
 def test_wrong_text_is_explained(text: str, message: str) -> None:
-    """Errors name the key, and suggest the nearest spelling."""
+    """Most errors name the key, and a misspelt word gets a suggestion."""
     with pytest.raises(MapError) as caught:
         BodyMap.from_toml(text, *GROWN)
     assert message in str(caught.value)

@@ -84,7 +84,7 @@ def test_a_wrong_symmetry_is_refused(
     kind: type[Exception],
     message: str,
 ) -> None:
-    """Partners exist, have one unit, shape and gain, and ranges that are mirror images."""
+    """Partners must exist, have one unit and mirrored ranges, flip together, and be no blocks."""
     action = ant_action() if layout is None else pendulum_action()
     with pytest.raises(kind, match=message):
         BodyMap.mirror(layout or ant_observation(), action, swap=swap, flip=flip)

@@ -47,10 +47,10 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
 
     Args:
         env: The target env.
-        body_map: Map between the bodies, or its JSON; Gymnasium can serialise a spec with the JSON,
-            but not with a map.
+        body_map: Map between the bodies, or its JSON; the spec of this env contains the JSON.
 
     Raises:
+        MapError: If the JSON is not a body map.
         SpaceMismatch: If a space of the target does not have the size of its layout.
     """
 
@@ -99,7 +99,7 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
 
 
 def check_size(which: str, space: Any, layout: Layout) -> Box[Any]:
-    """Return the space if it is flat and has the size of its layout; raise otherwise."""
+    """Return the space if it is a flat Box of the size of its layout; raise otherwise."""
     if not isinstance(space, Box) or space.shape != (layout.size,):
         raise SpaceMismatch(
             f"The layout of the {which} has {layout.size} numbers, so its space must be a Box of "

@@ -53,7 +53,7 @@ def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tu
 
 
 def _invert_entries(half: Half, otherwise: RuleLike) -> tuple[MapEntry, ...]:
-    """Return the rule that recovers each feature of `side.over` from a copy in `side.into`."""
+    """Return the rule that recovers each feature of `side.over`; `otherwise` without a copy."""
     result: list[MapEntry] = []
     for feature in half.side.over:
         name = feature.name
@@ -88,8 +88,8 @@ class MapRow(NamedTuple):
 class BodyMap(msgspec.Struct, frozen=True, dict=True):
     """Map that lets a policy of a source body act in a target body.
 
-    Each source observation feature is filled from target observation features, and each target
-    action feature from source action features. Both halves are affine:
+    Each source observation feature is a constant or a scaled copy of a target observation feature,
+    and each target action feature is a constant or a scaled copy of a source action feature:
 
         o_source = M o_target + c        a_target = clip(N a_source + d)
 
@@ -155,23 +155,23 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
                 (the middle of the range), "learn" and "copy NAME"; stars in NAME are replaced by
                 the text that the glob's wildcards match, as in
                 `{"foot_*/motor": "copy ankle_*/motor"}`.
-            observation_rules: Rules of source observation features only; they override `rules`.
-            action_rules: Rules of target action features only; they override `rules`.
+            observation_rules: More rules of source observation features, which precede `rules`.
+            action_rules: More rules of target action features, which precede `rules`.
             otherwise: The rule of features that no name and no glob matches.
-            units: "same" passes action numbers on unchanged. "torque" scales them by source gain
-                over target gain, so that they give the same torque as in the source. "exact" uses
-                each scale and constant as given, without a check of units and ranges.
+            units: "same" adds no factor to copied numbers. "torque" multiplies actions of known
+                gain by source gain divided by target gain, for the same torque as in the source.
+                "exact" adds no factor, and does not check units, nor the range of a rule's `Hold`.
 
         Raises:
-            MapError: If a partner has another unit or shape, if a rule changes nothing, or if no
-                name occurs in both bodies.
+            MapError: If a copy has another shape, or another unit and a scale of 1 or -1; if a rule
+                is wrong or changes nothing; or if nothing is copied and a feature has no rule.
             UnknownName: If a rule matches no feature, or copies one that does not exist.
         """
         shared = dict(rules or {})
         on_observation, on_action = dict(observation_rules or {}), dict(action_rules or {})
         sensed = Side("observation", source_observation, target_observation)
         moved = Side("action", target_action, source_action)
-        # The rules of one side come first, and `rules` does not override their values.
+        # The rules of one side come first, and keep their values if `rules` has the same keys.
         observation = resolve(sensed, on_observation | shared | on_observation, otherwise, units)
         action = resolve(moved, on_action | shared | on_action, otherwise, units)
         check_patterns(shared, [(sensed, observation), (moved, action)])

@@ -24,8 +24,8 @@ The mirror is the plane y = 0, with x forward and z up. It changes the sign of t
 vector (position, velocity, force) and of the x and z components of an axial vector (angular
 velocity, torque). A rotation about the axis n becomes the rotation by the same angle about n with
 its y component kept and the others negated, so a quaternion (w, x, y, z) negates x and z. The angle
-of a hinge keeps its sign if the mirror maps the hinge's axis to the axis of its partner, and
-changes it if the mirror maps it to the opposite axis: the caller lists those hinges in `flip`.
+of a hinge keeps its sign if its axis, changed in this way, is the axis of its partner. It changes
+its sign if the changed axis is opposite to the partner's: the caller lists such hinges in `flip`.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def check_patterns(
             raise UnknownName(kind, pattern, [name for name, _ in names])
         raise MapError(
             f"The rule {pattern!r} changes nothing: each feature that it matches has a partner "
-            "of the same name or an earlier rule; name a feature exactly to override that."
+            "of the same name or another rule; name a feature exactly to override that."
         )
 
 
@@ -199,7 +199,7 @@ _Read = TypeVar("_Read")
 
 
 class MirrorText(msgspec.Struct):
-    """The mirror image of a map in TOML."""
+    """The part `[symmetry]` of a map in TOML."""
 
     of: str = "source"
     swap: dict[str, str] = {}
@@ -272,7 +272,7 @@ def _check_keys(kind: str, table: Mapping[str, object], known: Sequence[str]) ->
 def mirrored_entries(
     observation: Layout, action: Layout, swap: Mapping[str, str], flip: Iterable[str]
 ) -> tuple[tuple[MapEntry, ...], tuple[MapEntry, ...]]:
-    """Return the entries of a body's mirror image, which is its own inverse: `BodyMap.mirror`."""
+    """Return the observation and action entries of `BodyMap.mirror`."""
     names = (*observation.names, *action.names)
     elements = tuple(dict.fromkeys(name.split("/", 1)[0] for name in names))
     partners = _both_ways(swap, elements)

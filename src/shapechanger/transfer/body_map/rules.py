@@ -148,7 +148,7 @@ class MapEntry:
     Attributes:
         feature: Name of the feature that is filled.
         rule: The rule.
-        why: Origin of the rule: "same name", "rule 'foot_*'", "default" or "symmetry".
+        why: Origin of the rule, such as "same name", "rule 'foot_*'", "default" or "symmetry".
     """
 
     feature: str
