@@ -86,7 +86,7 @@ def test_a_zip_of_stable_baselines3_is_converted(
     [
         (SAC, {"train_freq": (1, "episode")}, "it must update after steps"),
         (SAC, {"policy_kwargs": {"n_critics": 3}}, "These policy_kwargs change the networks"),
-        (SAC, {"policy_kwargs": {"activation_fn": nn.Tanh}}, "both must be the same, with ReLU"),
+        (SAC, {"policy_kwargs": {"activation_fn": nn.Tanh}}, "layers must be the same, with ReLU"),
         (A2C, {}, "is of another algorithm or policy class"),
         (PPO, {"policy_kwargs": {"net_arch": {"pi": [8], "vf": [9]}}}, "both must be the same"),
     ],

@@ -156,14 +156,14 @@ def test_every_env_of_the_catalogue_has_a_reference() -> None:
 
 @pytest.mark.parametrize("env_id", REFERENCES)
 def test_a_reference_policy_performs_as_stated(env_id: str) -> None:
-    """The card has the reference's numbers; an episode covers 25 % of the way from floor to end."""
+    """The card has the reference's numbers; an episode covers over 25 % from floor to end."""
     env, reference = EnvRef(env_id), REFERENCES[env_id]
     policy = load_policy(reference_policy(env_id))
     assert policy.card.env == env
     assert (policy.card.steps, policy.card.seed) == (reference.steps, reference.policy_seed)
     assert policy.card.learner == reference.learner
     assert policy.card.identity == known({ENV: identify(env)})
-    # Reference policies of pendulums were trained when learners' actions were forces in N.
+    # Policies of single pendulums were trained when learners' actions were forces in N.
     in_newtons = "Pendulum" in env_id and "Double" not in env_id
     assert default_learner(env) == ("ppo-pendulum" if in_newtons else reference.learner)
     with closing(env.make()) as made:

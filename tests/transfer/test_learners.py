@@ -209,8 +209,8 @@ def test_some_settings_change_and_others_stay() -> None:
     assert resolve_learner("ppo-run", {}) == ("ppo-run", learner_settings("ppo-run"))
 
 
-def test_every_learner_states_what_it_was_tuned_on() -> None:
-    """The envs exist, and the text states whether an env is one of them."""
+def test_envs_that_learners_were_tuned_on_exist_and_are_named() -> None:
+    """The text states whether an env is one of them, or that the envs are unknown."""
     for learner in LEARNERS:
         for name in tuned_on(learner):
             assert f"shapechanger/{name}-v1" in gym.registry

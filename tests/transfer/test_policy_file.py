@@ -144,7 +144,7 @@ def test_unsuitable_numbers_are_refused(
     ],
 )
 def test_harmful_settings_are_refused(settings: dict[str, Any], text: str, tmp_path: Path) -> None:
-    """Such settings allocate no memory, and no function is called."""
+    """Settings that need too much memory, name a function or do not fit are refused."""
     known = json.loads(msgspec.json.encode(load_policy(POLICIES["reach"]).card.settings))
     assert text in _refused(tmp_path, settings=known | settings)
 

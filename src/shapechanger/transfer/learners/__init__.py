@@ -1,7 +1,7 @@
 """Base classes of learners and of their settings.
 
-A learner is one file, of Shapechanger or of another package: a class of settings, which is
-registered as an entry point in the group `shapechanger.learners`, and the `Learner` that it names.
+A learner, of Shapechanger or of another package, has two classes: its settings, registered as an
+entry point in the group `shapechanger.learners`, and the `Learner` that the settings name.
 """
 
 from __future__ import annotations
@@ -170,5 +170,5 @@ class Learner(Generic[_Settings]):
         raise NotImplementedError
 
     def origin(self, path: Path) -> PolicyCard:
-        """Read the card of a source policy; raise PolicyError if another learner trained it."""
+        """Read the card of a source policy; PolicyError if the learner cannot start from it."""
         raise NotImplementedError

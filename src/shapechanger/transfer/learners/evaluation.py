@@ -1,4 +1,4 @@
-"""Evaluation of policies: whole episodes from starts that are the same for every policy."""
+"""Evaluation of policies: whole episodes, with the same starts for every trained policy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from shapechanger.contract.env_ref import (
 from shapechanger.errors import require_known
 
 EVALUATION_SEED: Final = 10_000_000
-"""Seed of the first evaluation episode: far from the seeds of training."""
+"""Smallest seed of an episode that evaluates a trained policy."""
 # Option of an env that selects one of many bodies by its seed.
 _INDIVIDUAL: Final = "finger_seed"
 # Largest numbers of bodies, and of episodes per body, that get distinct seeds below 2^32.
@@ -66,9 +66,9 @@ class Evaluation(msgspec.Struct, frozen=True):
 def evaluation_seed(env: EnvRef, episodes: int) -> int:
     """Return the seed of the first evaluation episode in an env.
 
-    The seed is the same for all policies, so arms are compared on equal episodes. Each individual
-    body, such as one of many random fingers, has its own seeds, so that a mean over bodies is also
-    a mean over many tasks.
+    The seed is the same for all trained policies, so arms are compared on equal episodes. Each
+    individual body, such as one of many random fingers, has its own seeds, so that a mean over
+    bodies is also a mean over many tasks.
     """
     individual = int(env.kwargs.get(_INDIVIDUAL) or 0) % _MOST_INDIVIDUALS
     return EVALUATION_SEED + min(episodes, _MOST_EPISODES) * individual
@@ -168,7 +168,7 @@ def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episo
 
 
 def random_actions(space: gym.Space[Any], seed: int) -> Act:
-    """Return a policy that draws actions uniformly."""
+    """Return a policy that draws its actions from the space, with this seed."""
     space.seed(seed)
     return lambda observations: np.stack([space.sample() for _ in observations])
 

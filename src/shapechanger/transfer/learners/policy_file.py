@@ -83,10 +83,10 @@ class TrainedPolicy(Policy):
     """A policy with its normalisation and card.
 
     Attributes:
-        model: Model of Stable-Baselines3, whose actions are from -1 to 1; see
+        model: Model of Stable-Baselines3, with actions from -1 to 1 unless it was trained without
             `shapechanger.transfer.actions`. A loaded model has the weights and settings of the
             trained model, and a new optimiser.
-        normalisation: Statistics of the training; None if observations are not normalised.
+        normalisation: Statistics of the training; None if it normalised nothing.
         card: Provenance of the policy.
     """
 
@@ -175,7 +175,7 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
 
 
 def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> None:
-    """Refuse numbers that are not finite, and a network that is larger than the file.
+    """Refuse numbers that are not finite, a network larger than the file, and too many envs.
 
     PyTorch allocates a network's memory before it compares sizes.
     """
@@ -350,7 +350,8 @@ def convert_zip(
         command: The command that converts the zip.
 
     Raises:
-        PolicyError: If the file is missing, not a zip of a model, or of another algorithm.
+        PolicyError: If the file is missing, not a zip of a model, or has another kind of model.
+        TransplantError: If the model has gSDE or another features extractor.
         SpaceMismatch: If the layouts do not fit the policy's spaces.
     """
     model = _read_zip(path)
@@ -402,7 +403,7 @@ def _settings_of(model: Any) -> Sb3Settings:
     if actor != critic or model.policy.activation_fn is not activation:
         raise PolicyError(
             f"The actor has layers {actor} and the critic {critic}, with "
-            f"{model.policy.activation_fn.__name__}: both must be the same, with "
+            f"{model.policy.activation_fn.__name__}: the layers must be the same, with "
             f"{activation.__name__}."
         )
     kind: type[PpoSettings | OffPolicySettings] = PpoSettings if on_policy else OffPolicySettings

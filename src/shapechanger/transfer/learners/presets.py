@@ -49,7 +49,7 @@ LEARNERS: Final[Mapping[str, LearnerSettings]] = _Presets()
 
 
 def in_many_bodies(name: str) -> str:
-    """Return the preset for many bodies that corresponds to a preset for one body."""
+    """Return the preset that replaces a preset in many bodies; the same preset if none does."""
     return _tables().get(name, {}).get("in_many_bodies", name)
 
 

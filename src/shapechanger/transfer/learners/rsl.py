@@ -49,7 +49,7 @@ class RslVecEnv(RslEnvs):
     """Worlds of `shapechanger.make_vec(backend="warp")` with the interface of rsl-rl's envs.
 
     Observations are in the group `policy`. A world whose episode has ended starts again in the same
-    step, and `time_outs` is true for worlds whose episode ended only because of the time limit.
+    step, and `time_outs` is true for worlds whose episode was truncated without terminating.
     Actions are clipped to the range from -1 to 1, as in Stable-Baselines3. `rows` are `DeviceRows`
     for a policy of limbs, or None for the body's observations and actions.
     """
@@ -184,7 +184,7 @@ class _Returns:
             )
 
     def scaled(self, rewards: Tensor, ends: Tensor) -> Tensor:
-        """Divide the rewards of a step, (n,), by the deviation of the returns; `ends`: (n,)."""
+        """Return rewards, (n,), divided by the returns' deviation, within ±10; `ends`: (n,)."""
         if self._statistics is None:
             return rewards
         self._returns = self._returns * self._gamma + rewards

@@ -44,8 +44,8 @@ OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]
 
 START_LOG_STD: Final = -1.0
-"""Smallest logarithm of the standard deviation of an action, in half its range, at the start of
-training from a policy.
+"""Smallest logarithm of the standard deviation of an action, in units of half its range, at the
+start of training from a policy.
 
 A converged policy hardly explores: the shipped policy of the finger has standard deviations of 0.06
 to 0.22, with which fine-tuning reached no target of another finger in 30,720 steps
@@ -75,7 +75,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         on_steps: OnSteps = lambda steps: None,
         callback: BaseCallback | None = None,
     ) -> TrainedPolicy:
-        """Train a policy, evaluating it before the first step, along the way, and at the end.
+        """Train a policy; evaluate it at the end, and earlier unless `on_evaluation` is `ignore`.
 
         `steps` are rounded up to whole updates, `on_steps` is called after each step of all envs,
         and `callback` is a callback of Stable-Baselines3.
@@ -255,7 +255,7 @@ def statistics_of(envs: VecEnv) -> Normalisation | None:
 
 
 class _ActFirst(BaseCallback):
-    """Lets a transplanted policy act before the first update, when a new policy acts randomly."""
+    """Lets a transplanted policy act before the first update, when a new one acts randomly."""
 
     def __init__(self, learning_starts: int) -> None:
         super().__init__()

@@ -16,7 +16,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
     """Settings that all learners of Stable-Baselines3 share.
 
     Attributes:
-        eval_every: Target steps between two evaluations, at least `update_steps`.
+        eval_every: Env steps between two evaluations, at least `update_steps`.
     """
 
     algorithm: str
@@ -78,7 +78,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
         return self.for_one_env() if "device" in self.takes else self
 
     def for_budget(self, steps: int) -> Self:
-        """Return settings for a shorter budget: four evaluations, half as many source steps."""
+        """Return settings for a shorter budget: four or more evaluations, half of it as source."""
         every = min(self.eval_every, self.whole_updates(steps // 4))
         return msgspec.structs.replace(self, eval_every=every, source_steps=0)
 
@@ -233,8 +233,8 @@ class ImportedSettings(Sb3Settings, frozen=True, kw_only=True, tag="imported"):
 
     Attributes:
         algorithm: The class as `module:Class`, called as `Class("MlpPolicy", envs, seed=seed,
-            **arguments)`; or a function `module:function(envs, seed, **arguments)` that returns a
-            model.
+            device="cpu", tensorboard_log=folder, **arguments)`; or a function
+            `module:function(envs, seed, **arguments)` that returns a model.
         steps_per_update: Steps of each env between two updates, which the class calls `n_steps` or
             `train_freq`.
         arguments: Arguments of the class or function.

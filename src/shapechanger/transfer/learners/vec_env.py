@@ -23,8 +23,8 @@ class ThreadVecEnv(DummyVecEnv):
 
     As in `DummyVecEnv`, an env whose episode has ended is reset in the same step. Its info then
     contains the last observation as `terminal_observation`. `TimeLimit.truncated` in every info is
-    true if only the time limit ended the episode. Rewards are float32. Other arguments are passed
-    to `shapechanger.make_vec`.
+    true if the episode was truncated and did not terminate. Rewards are float32. Other arguments
+    are passed to `shapechanger.make_vec`.
     """
 
     def __init__(
