@@ -46,7 +46,7 @@ def _limb_env(env: EnvRef = ANT, room: int = 0) -> LimbEnv:
     "env", ["Ant", "ExtendedAnt", "HalfCheetah", "Humanoid", "InvertedPendulum"]
 )
 def test_every_number_has_one_column(env: str) -> None:
-    """Each observation has one column of one row, which is named after its part."""
+    """Each observation has one column of one row; columns of limbs are named after the limb."""
     with gym.make(f"shapechanger/{env}-v1") as made:
         rows = rows_of(made)
         names = rows.layouts()[0].names
@@ -75,7 +75,7 @@ def test_actions_reach_their_motors() -> None:
 
 
 def test_envs_of_many_bodies_equal_single_ones() -> None:
-    """Rows, rewards, ends and infos of each env equal the single env's."""
+    """Rows, rewards, ends and speeds of each env equal the single env's."""
     envs = LimbVecEnv(ANT.having(SOME), 12)
     single = limb_envs(ANT.having(SOME), 12)
     envs.seed(5)

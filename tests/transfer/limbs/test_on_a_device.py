@@ -206,7 +206,7 @@ def test_batches_of_worlds_with_equal_spaces_share_a_tensor() -> None:
 
 
 def test_training_changes_every_layer(policy: TrainedPolicy) -> None:
-    """Two updates in bodies with different spaces change all weights."""
+    """A second update in bodies with different spaces changes all weights."""
     found: list[Evaluation] = []
     counted: list[int] = []
     trained = _learner().train(BOTH, 96, 0, on_evaluation=found.append, on_steps=counted.append)

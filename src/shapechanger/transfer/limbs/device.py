@@ -24,7 +24,7 @@ from shapechanger.transfer.limbs.rows import LimbRows
 
 
 class DeviceRows:
-    """Map between observations and actions of `shapechanger.make_vec(backend="warp")` and rows."""
+    """Map between observations and actions of `make_vec(backend="warp")` and rows: `LimbRows`."""
 
     def __init__(self, envs: Any, each: Sequence[LimbRows]) -> None:
         self.room = each[0].room
@@ -44,7 +44,7 @@ class DeviceRows:
         return self._gathered(parts)
 
     def actions(self, limbs: Tensor) -> Tensor | list[Tensor]:
-        """Return the actions of all worlds for numbers from -1 to 1, shape (n, room)."""
+        """Return the actions of all worlds or each batch for numbers from -1 to 1, (n, room)."""
         parts = [rows.actions(limbs[numbers]) for numbers, rows in self._batches]
         return parts if self._apart else self._gathered(parts)
 

@@ -82,7 +82,7 @@ def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
 class LimbVecEnv(DummyVecEnv):
     """Many envs with rows, of bodies that may differ in their number of limbs.
 
-    Envs whose spaces agree are stepped together. The envs cycle through the bodies of `env`, see
+    Envs whose layouts agree are stepped together. The envs cycle through the bodies of `env`, see
     `each_body`, and each body has at least one env. `room` is the number of limbs that
     have rows; 0 for as many as the bodies have.
     """
@@ -163,7 +163,7 @@ def bodies_in_turn(
 
 
 def together(bodies: Sequence[EnvRef]) -> EnvRef:
-    """Combine references that differ in their body into one with the argument `bodies`."""
+    """Combine references that differ only in `body` into one with the argument `bodies`."""
     if "body" not in bodies[0].kwargs:
         return bodies[0]
     edits = [body.kwargs["body"] for body in bodies]
@@ -183,7 +183,7 @@ def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:
 
 
 class LimbLearner(Sb3Learner):
-    """PPO with a policy of limbs, whose weights fit any body of a family."""
+    """PPO with a policy of limbs, which can act in other bodies of the same family."""
 
     settings: Any
 

@@ -124,7 +124,7 @@ class LimbPolicy(ActorCriticPolicy):
         return observation.float().reshape(len(observation), -1, self._width)
 
     def act(self, observations: NDArray[Any]) -> NDArray[np.float32]:
-        """Return mean actions from -1 to 1, shape (n, limbs), for any number of limbs.
+        """Return mean actions from -1 to 1, shape (n, limbs).
 
         The observations are flattened rows, shape (n, (1 + limbs) * width).
         """

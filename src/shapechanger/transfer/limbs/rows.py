@@ -90,7 +90,7 @@ class LimbRows:
 
     @staticmethod
     def stacked(each: Sequence[LimbRows]) -> LimbRows:
-        """Stack the maps of bodies whose observations have the same order, one body per row."""
+        """Stack the maps of bodies whose observations have the same order, along a new axis 0."""
         own = ("scale", "offset", "constant", "low", "high")
         return replace(
             each[0], **{name: np.stack([getattr(rows, name) for rows in each]) for name in own}
