@@ -133,7 +133,7 @@ def test_methods_that_fine_tune_start_with_the_source_policy(study: tuple[Study,
 
 
 def test_a_frozen_trunk_stays(study: tuple[Study, Path]) -> None:
-    """The second layer equals the source's, and all others have changed."""
+    """The policy's second layer equals the source's; its others and the value network change."""
     source, frozen = _weights(study, "source"), _weights(study, "frozen-trunk")
     tuned = _weights(study, "fine-tune")
     trunk = "mlp_extractor.policy_net.2.weight"
@@ -189,7 +189,7 @@ def test_intermediate_bodies_grow() -> None:
 
 
 def test_a_shuffled_map_has_the_same_rules() -> None:
-    """Rules are exchanged between entries of one shape; constants stay."""
+    """The entries have the same rules in another order, which depends only on the generator."""
     right = body_map(ANT.make(), EXTENDED.make())
     wrong = shuffle(right, np.random.default_rng(0))
     for side in ("observation", "action"):
@@ -202,7 +202,7 @@ def test_a_shuffled_map_has_the_same_rules() -> None:
 
 
 def test_a_randomised_source_draws_intermediate_bodies(tmp_path: Path) -> None:
-    """The env is written to the run's folder."""
+    """The source env, with the argument `towards`, is written to the run's folder."""
     plan = tiny_plan(TINY, steps=64, source_steps=64, arms=("scratch", "randomised"))
     study = run_study(plan, tmp_path, executor=Serial())
     assert study.curves("randomised").n_evals == 1
@@ -218,7 +218,7 @@ def short(**more: Any) -> OffPolicySettings:
 
 
 def test_methods_with_replay_buffers_are_evaluated_at_the_steps_of_scratch(tmp_path: Path) -> None:
-    """Each learner has two envs."""
+    """The learner steps two envs at once."""
     arms = ("scratch", "prefilled-replay", "off-dynamics")
     plan = tiny_plan(short(n_envs=2), steps=64, source_steps=160, arms=arms)
     study = run_study(plan, tmp_path, executor=Serial())
@@ -289,7 +289,7 @@ FOLLOWS = EnvRef("shapechanger/FingerTrack-v1")
 
 @pytest.fixture(scope="module")
 def gap(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[Any]]:
-    """A small study of the gap between fingers, its folder, and the identified fingers."""
+    """A small study of a gap between fingers, its folder, and the target fingers that moved."""
     moved: list[Any] = []
 
     # Identification itself is tested elsewhere.
@@ -389,13 +389,13 @@ def test_a_failed_evaluation_costs_no_training(
 
 
 def test_default_arms() -> None:
-    """All arms are included if the target adapts its source; otherwise the three basic ones."""
+    """The arms that adapt the source need a target that supports them and has equal layouts."""
     assert default_arms(inspect_task(TransferTask(FINGER, REAL_LIKE))) == _EVERY
     assert default_arms(inspect_task(TransferTask(FINGER, FOLLOWS))) == ARMS
     assert default_arms(inspect_task(TransferTask(SMALL, BIG))) == ARMS
 
 
-def test_an_exclusive_env_is_used_by_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_is_exclusive_if_its_target_is(monkeypatch: pytest.MonkeyPatch) -> None:
     task = TransferTask(FINGER, REAL_LIKE)
     assert not tiny_plan(task=task).exclusive
     monkeypatch.setattr(FingerReachEnv, "exclusive", True, raising=False)

@@ -1,6 +1,6 @@
 """Transfer methods: how the arms of a study use the source.
 
-A method is a small class with a name, in one file, which is imported only if the method is used.
+A method is a small class with a name. Its file is imported only if the method is used.
 Other packages add methods in three ways: by `register` in a module that is already imported, by an
 entry point of the group `shapechanger.methods`, or by a name such as `my_package:warm-start`, which
 imports `my_package` first, as ids of Gymnasium do.
@@ -35,11 +35,11 @@ class MethodRun:
         folder: Folder of the run, for files of the method.
         source_file: File of the source policy of this run's seed, or of the given source policy.
         policy_file: File of the policy of this run.
-        shared: Returns the shared file of a kind of run: "source" or "scratch".
+        shared: Returns the file that runs of a kind share, such as "source" or "scratch".
         kind: The kind of the run.
         identity: Identity of a custom method, for the card of its policy; empty for shipped ones.
         report: Records an evaluation on the target. Evaluations of a method that learns on the
-            target are at the same steps as the evaluations of scratch.
+            target must be at the same steps as the evaluations of scratch.
         on_steps: Called with the number of steps done in all trainings of this run.
     """
 
@@ -66,7 +66,7 @@ class MethodRun:
         return self.learner.settings
 
     def source_policy(self) -> Any:
-        """Load the source policy of this run's seed."""
+        """Load the source policy of this run, see `source_file`."""
         return self.learner.load(self.source_file)
 
     def train(
@@ -85,7 +85,7 @@ class MethodRun:
         """
         before = self._done
         if "demonstrations" in self.settings.takes:
-            # All arms share the demonstrations of a target and differ only in their first policy.
+            # All arms share the demonstrations of a target.
             shared = self.shared("scratch" if env == self.target else self.kind)
             more |= {"demonstrations": shared, "only_last": env != self.target}
         policy = self.learner.train(
@@ -104,8 +104,8 @@ class MethodRun:
     def fine_tune(self, *, start: Any = None, body_map: BodyMap | None = None, **more: Any) -> Any:
         """Train on the target from a policy, whose weights are transplanted.
 
-        The default is the source policy of this run's seed, with the study's map. `more` are
-        arguments of `train`.
+        The default is the source policy of this run, with the study's map. `more` are arguments of
+        `train`.
         """
         return self.train(
             self.target,
@@ -127,7 +127,7 @@ class MethodRun:
         policy.save(self.policy_file)
 
     def evaluate(self, policy: Any, body_map: BodyMap | None = None) -> Evaluation:
-        """Evaluate a policy on the target, through a map or the study's, without training it."""
+        """Evaluate a policy on the target, through this map or the study's, without training."""
         return self.learner.evaluate(self.target, policy, body_map or self.body_map)
 
 

@@ -1,4 +1,4 @@
-"""Methods that work with every learner, or only need its interface, such as fine-tuning."""
+"""Methods that only use the interface of learners, such as fine-tuning."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class ShuffledMap(Method):
 
 
 def shuffle(body_map: BodyMap, rng: np.random.Generator) -> BodyMap:
-    """Return a body map with the same rules, assigned to the entries in random order."""
+    """Return a body map with the same rules, whose copies of equal shape are exchanged randomly."""
     return msgspec.structs.replace(
         body_map,
         observation=_shuffled(body_map.observation, body_map.source_observation, rng),
@@ -141,13 +141,13 @@ _ON_THE_WAY: Final = 0.5
 class Evolution(Method):
     """Fine-tune on one body after another, each a little more like the target.
 
-    Half of the target steps are spent on bodies between source and target, one body for each
-    evaluation of the learning curve. REvolveR chooses the next body by the policy's performance;
-    here the bodies are at equal distances.
+    At most half of the target steps are spent on bodies between source and target, in each for the
+    steps between two evaluations. REvolveR chooses the next body by the policy's performance; here
+    the bodies are at equal distances.
     """
 
     name = "evolution"
-    needs = (("trial", "a learner of Stable-Baselines3"),)
+    needs = (("trial", "a learner that trains by steps in an env"),)
     paper = "X. Liu, D. Pathak and K. M. Kitani, REvolveR, ICML 2022"
     one_family = True
 
@@ -187,7 +187,7 @@ def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
 
 
 def _map_between(one: EnvRef, other: EnvRef, run: MethodRun) -> BodyMap:
-    """Return the study's map if it fits both envs, else a map that matches names."""
+    """Return the identity if layouts are equal, the study's map if it fits, or a map by names."""
     with closing(one.make()) as before, closing(other.make()) as after:
         (seen, acted), (sees, acts) = layouts_of(before), layouts_of(after)
     if (seen, acted) == (sees, acts):

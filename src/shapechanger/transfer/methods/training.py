@@ -42,7 +42,7 @@ class FrozenTrunk(Method):
     paper = "C. Devin and others, Learning Modular Neural Network Policies, ICRA 2017"
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Refuse learners that the method cannot use, and networks with one hidden layer."""
+        """Refuse learners that the method cannot use, and fewer than two hidden layers."""
         super().require(source, target, settings)
         if len(cast("Any", settings).net_arch) < _LEAST_LAYERS:
             raise self._lacks(_PPO)
@@ -173,7 +173,7 @@ _PREFILLED: Final = 0.5
 _WIDTH: Final = 256
 _NOISE: Final = 0.1
 _BATCH: Final = 256
-# Source steps between two gradient steps of the classifiers.
+# Steps of each source env between two gradient steps of the classifiers.
 _CLASSIFY_EVERY: Final = 4
 # Bound on the correction of a single transition's reward.
 _LARGEST_CORRECTION: Final = 10.0
