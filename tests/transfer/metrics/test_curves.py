@@ -104,7 +104,7 @@ def test_total_steps_jump_without_a_slope() -> None:
         (30, (-30 + 0.35 * 70) / 100, (-30 + 0.65 * 70) / 100),
         # On an evaluation: floor -1 · 50, then the first half of the curve.
         (50, (-50 + 0.25 * 50) / 100, (-50 + 0.75 * 50) / 100),
-        # Almost no target steps are left: nearly the value of the first evaluation.
+        # One target step is left: floor -1 · 99, then the first step of the curve.
         (99, (-99 + 0.005) / 100, (-99 + 0.995) / 100),
         # No target steps are left.
         (100, -1.0, -1.0),
@@ -131,7 +131,7 @@ SCRATCH = LearningCurves(FEW, np.array([[-100.0, 200.0, 300.0], [-100.0, 400.0, 
 
 
 def test_scores_run_from_zero_to_one() -> None:
-    """A score of 0 is the value without skill and 1 the best arm's end; better runs are above 1."""
+    """A score of 0 is `zero` and 1 is `one`; scores outside of this range may be clipped."""
     reference = Reference(zero=-100.0, one=300.0)
     scores = reference.scores(LearningCurves(FEW, np.array([[-200.0, 100.0, 500.0]])))
     np.testing.assert_allclose(scores.returns, [[-0.25, 0.5, 1.5]])
@@ -184,8 +184,8 @@ def test_reference_is_finite(bad: float) -> None:
         (-1e6, 1e6, True),
     ],
 )
-def test_scores_exist_only_if_an_arm_learned(zero: float, one: float, defined: bool) -> None:
-    """Scores are undefined unless an arm ended above zero, beyond rounding."""
+def test_scores_exist_only_if_one_is_above_zero(zero: float, one: float, defined: bool) -> None:
+    """Scores are undefined unless `one` is above `zero` by more than rounding."""
     reference = Reference(zero, one)
     assert reference.defined is defined
     if not defined:

@@ -1,7 +1,7 @@
 """Learning curves and scores.
 
 Every measure interpolates a curve linearly between evaluations, so areas, crossings and values are
-consistent. A score of 0 means no skill, and 1 is the target's reference.
+consistent. A score of 0 means no skill, and 1 is the target's reference, or else the best arm.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class LearningCurves:
 
     @property
     def horizon(self) -> float:
-        """The last step that counts, H; it includes source steps."""
+        """H, the last step that counts: the last of `steps`, even if source steps count too."""
         return float(self.steps[-1])
 
     def at(self, steps: ArrayLike) -> NDArray[np.float64]:
@@ -127,8 +127,8 @@ def in_total_steps(curves: LearningCurves, source_steps: float, floor: float) ->
     Args:
         curves: The arm's curves in target steps.
         source_steps: S, environment steps spent on the source, >= 0.
-        floor: Value of the arm on the target while it still trains on the source: the return of
-            a random policy, or 0 if the curves are scores.
+        floor: Value of the arm on the target while it still trains on the source: the value
+            without skill, or 0 if the curves are scores.
 
     Returns:
         Curves on the same grid of evaluations.
@@ -217,7 +217,7 @@ class Reference(msgspec.Struct, frozen=True):
 
     @property
     def defined(self) -> bool:
-        """Return whether scores exist: an arm must end above the policies without skill."""
+        """Return whether scores exist: `one` must be above `zero` by more than rounding."""
         size = max(1.0, abs(self.zero), abs(self.one))
         return self.one - self.zero > _SAME * size
 
@@ -231,7 +231,7 @@ class Reference(msgspec.Struct, frozen=True):
                 the mean of the best arm.
 
         Raises:
-            StudyError: If no arm learned, so that scores are undefined.
+            StudyError: If scores do not exist, see `defined`.
         """
         if not self.defined:
             raise StudyError(

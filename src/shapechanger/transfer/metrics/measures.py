@@ -4,8 +4,8 @@ Source of the five: M. E. Taylor and P. Stone, "Transfer Learning for Reinforcem
 Domains: A Survey", JMLR 10 (2009) 1633-1685, section 2.
 
 p is the mean curve over seeds and H the horizon. Curves of the arm are in target steps or, after
-`in_total_steps`, in total steps. Every function raises a StudyError if the arm and scratch cannot
-be compared. Positive differences mean that transfer helped.
+`in_total_steps`, in total steps. Every function of an arm and scratch raises a StudyError if they
+cannot be compared. Positive differences mean that transfer helped.
 """
 
 from __future__ import annotations
