@@ -192,7 +192,7 @@ def test_a_body_is_named_by_its_edits() -> None:
 
 
 def test_pictures_are_embedded(study: Study) -> None:
-    """Both bodies are embedded losslessly, each with its size and an alternative text."""
+    """Both bodies are embedded losslessly, each with a caption and an alternative text."""
     picture = np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8)
     page = study_html(study, (picture, picture[:, ::-1]), "To one scale.")
     found = re.findall(r'src="data:image/png;base64,([^"]+)" alt="([^"]+)"', page)
@@ -238,7 +238,7 @@ def test_every_pair_has_a_cell(suite_page: str) -> None:
 
 
 def test_methods_are_compared_by_target_and_over_all(suite_page: str) -> None:
-    """The page has interquartile means and probabilities of improvement, with intervals."""
+    """The table has a row for each arm on each target, and on all targets together."""
     words = Reader(suite_page).words
     assert words.count("all targets") == 3
     assert words.count("baseline") == 4
@@ -248,7 +248,7 @@ def test_methods_are_compared_by_target_and_over_all(suite_page: str) -> None:
 
 @pytest.mark.parametrize("seeds", [2, 5])
 def test_undefined_bootstrap_intervals_are_omitted(seeds: int) -> None:
-    """They are undefined for two runs, and if all runs of an arm are better."""
+    """An interval is undefined for two runs, and if all runs of one arm are better."""
     better, worse = rising(900.0, 950.0, 3e3), rising(0.0, 100.0, 3e3, seed=1)
     study = make_study(scratch=worse[:seeds], fine_tune=better[:seeds])
     words = Reader(suite_html("a", {"a": study}, seeds=seeds)).words

@@ -104,7 +104,7 @@ def test_caveats_name_limits_of_the_study() -> None:
     two = make_study(scratch=SCRATCH[:2], given=True)
     text = " ".join(caveats(two))
     assert "until its 2,048 source steps have passed" in text
-    assert "one given source policy" in text
+    assert "start from the one that was given" in text
     assert "With 2 seeds the intervals are wide" in text
     assert len(caveats(make_study())) == 1
     assert caveats(make_study(source_steps=0)) == ()

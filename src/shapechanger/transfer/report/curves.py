@@ -50,7 +50,7 @@ _LINE_STYLES: Final[dict[str, _LineStyle]] = {
     "generalist": _LineStyle(charts.PURPLE, "-", "*"),
     "random": _LineStyle(charts.GREY, ":", ""),
 }
-# Colours of methods that are not shipped, in their order in the study.
+# Styles of the other methods, in their order in the study; a fourth one has the first style again.
 _OTHER_STYLES: Final = (
     _LineStyle(charts.YELLOW, (0, (1, 1)), "D"),
     _LineStyle(charts.BLACK, (0, (4, 1, 1, 1)), "P"),

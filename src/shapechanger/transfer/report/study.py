@@ -36,7 +36,7 @@ Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 """The source's body and the target's, each of shape (height, width, 3)."""
 
 _MAX_ARGUMENT_LENGTH: Final = 40
-# Names of kinds of runs that are not arms.
+# Titles of kinds of runs; the title of any other kind is its name.
 _ARMS: Final = {"random": "random actions", "source": "source policy, in the source"}
 
 
@@ -140,7 +140,7 @@ def argument_text(value: object) -> str:
 
 
 def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str]]:
-    """Return the gains and the time to the last threshold, in target steps and in total steps."""
+    """Return the headline arm's gains and time to the last threshold, without undefined ones."""
     rows = [row for row in measures if row.arm == study.headline_arm]
     cards: list[dict[str, str]] = []
     for row in (rows[1], rows[0], rows[2], rows[-1]):
@@ -221,7 +221,7 @@ def _terms(arms: tuple[ArmRow, ...]) -> dict[str, Any]:
 
 
 def _body_map(ours: BodyMap) -> dict[str, Any]:
-    """Describe the map; entries that copy a feature of the same name are only counted."""
+    """Describe the map; entries that copy a feature of the same name are listed separately."""
     rows = ours.table()
     matched = [row for row in rows if row.why == SAME_NAME]
     groups: dict[tuple[str, str, str], list[str]] = {}

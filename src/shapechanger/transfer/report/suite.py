@@ -123,7 +123,7 @@ def gain_over_scratch(study: Study) -> Estimate:
 
 
 def _looks(studies: Mapping[str, Study], declared: int) -> str:
-    """State whether all studies have the declared number of seeds."""
+    """State which numbers of seeds were declared, are present, and were evaluated before."""
     now = {study.plan.seeds for study in studies.values()}
     grown = sorted({study.looks for study in studies.values() if len(study.looks) > 1})
     text = f"The suite declares {declared} seeds"
@@ -161,7 +161,7 @@ def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
     widest = max((abs(gain.value or 0.0) for gain in gains.values()), default=0.0) or 1.0
 
     def colour(share: float) -> str:
-        """Return the CSS colour of a gain, from -1 to 1."""
+        """Return the CSS colour of a gain divided by the largest, -1 to 1."""
         full = _HELPED if share >= 0.0 else _HURT
         mixed = (round(255 + _STRONGEST * abs(share) * (part - 255)) for part in full)
         return "#{:02x}{:02x}{:02x}".format(*mixed)
@@ -198,7 +198,7 @@ def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
 
 
 def _score_ends(studies: Sequence[Study]) -> dict[str, list[NDArray[np.float64]]]:
-    """Return final scores of each arm for one target; 1 is its reference, or else the best arm."""
+    """Return final scores of each arm, 1 for the target's reference or best arm; empty if none."""
     values = {
         arm: [finals(study, arm) for study in studies if arm in study.plan.arms]
         for arm in dict.fromkeys(arm for study in studies for arm in study.plan.arms)
@@ -241,7 +241,7 @@ def _method_rows(
 
 
 def _settings(studies: Mapping[str, Study]) -> list[tuple[str, str]]:
-    """Return the settings that the studies have in common, and their cost."""
+    """Return the settings, versions and cost of the studies."""
     plans = [study.plan for study in studies.values()]
     first = next(iter(studies.values()))
     hours = sum(run.wall_s for study in studies.values() for run in study.runs) / 3600.0

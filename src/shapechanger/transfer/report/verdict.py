@@ -157,7 +157,7 @@ def successes(study: Study, kind: str) -> NDArray[np.float64]:
 
 
 def weak_individuals(study: Study) -> list[str]:
-    """Return a sentence for each arm that names the individuals on which it rarely succeeds.
+    """Return a sentence for each arm that names the individuals with less success than `STRONG`.
 
     An individual is a body such as one finger. The list is empty if all seeds share one body, or if
     the env does not report success.
@@ -243,7 +243,7 @@ _TRANSFER: Final = {"up": "helped", "down": "hurt", "unclear": "made no clear di
 _NO_INTERVAL: Final = "cannot be judged without an interval"
 # With fewer seeds, intervals are so wide that they exclude 0 only for large effects.
 _FEW_SEEDS: Final = 5
-# If scratch rises by less than this share of its end, arms are not compared.
+# If no arm ends above the start of scratch by this share of its end, arms are not compared.
 _FLAT: Final = 0.1
 
 
@@ -267,8 +267,8 @@ def verdict(study: Study) -> str:
     """State in one sentence of at most 25 words whether transfer helped.
 
     The headline arm is judged by its total reward gain in target steps, a measure chosen in
-    advance, or by its jumpstart if it is not trained on the target. If scratch starts within a
-    tenth of its end, the sentence states that the study shows nothing.
+    advance, or by its jumpstart if it is not trained on the target. If no arm ends well above the
+    start of scratch, the sentence states that the study shows nothing.
     """
     arm, plan = study.headline_arm, study.plan
     scratch, text = study.curves("scratch"), partial(_mean_text, unit=plan.unit)
@@ -365,8 +365,8 @@ def caveats(study: Study) -> tuple[str, ...]:
         )
     if study.plan.source_policy:
         sentences.append(
-            "All runs of zero-shot and fine-tune start from the one given source policy: the "
-            "intervals do not cover other policies of the same source."
+            "All runs with a source policy start from the one that was given: the intervals do not "
+            "cover other policies of the same source."
         )
     if study.plan.individual:
         sentences.append(
