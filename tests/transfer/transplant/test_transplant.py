@@ -360,7 +360,7 @@ def test_critics_use_the_equal_name_or_the_mean() -> None:
 
 
 def test_statistics_go_with_their_names() -> None:
-    """Copied numbers get the source's mean and variance, scaled; new numbers get a guess."""
+    """Copied numbers get the source's scaled mean and variance; new ones depend on their range."""
     body_map = BodyMap.between(
         Layout((Feature("copy", "m"), Feature("z", "m"), Feature("angle", "rad"))),
         Layout(

@@ -2,8 +2,8 @@
 
 A body map is affine, and so are the first and the last layer of a network. The first layer absorbs
 the map of observations, and the last layer absorbs the map of actions. Before training, the
-transplanted policy acts in the target exactly like the source policy through the map, up to
-rounding. New inputs start with weights of zero and are trainable.
+transplanted policy acts like the source policy through the map, up to rounding, except in actions
+with the rule `learn` and for clipped inputs. Weights of new inputs start at zero and are trainable.
 
 `transplant` moves a model of Stable-Baselines3, and `transplant_normalisation` moves the statistics
 that normalise its observations.

@@ -82,11 +82,11 @@ def observation_affine(body_map: BodyMap, source: Scaling, target: Scaling) -> A
 def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> RunningMeanStd:
     """Transplant observation statistics from the source to the target.
 
-    If a source number copies a target number, the target number gets the source's mean and
-    variance, divided by the scale. Of several copies, the copy of the same name counts, or else the
-    first. A new number is assumed to be uniform in its range. Without a range, it gets the value
-    in the range nearest to 0 as its mean, and the variance 1. The count is kept, so the source's
-    experience keeps its weight.
+    If a source number copies a target number, the target number gets the source's mean divided by
+    the scale, and the source's variance divided by the squared scale. Of several copies, the copy
+    of the same name counts, or else the first. A new number is assumed to be uniform in its range.
+    If the range is infinite, the mean is the value in it nearest to 0, and the variance is 1. The
+    count is kept, so the source's experience keeps its weight.
 
     Args:
         source: Mean and variance of the source's observations, shape (source_observation.size,).
@@ -119,7 +119,7 @@ def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> Runni
 
 # tanh reaches 1 only at infinity; a constant at a bound is placed a millionth inside.
 _CLOSEST_TO_BOUND: Final = 1.0 - 1e-6
-# Bounds of a Box are in single precision.
+# Tolerance of ratios and shifts, because bounds of a Box are in single precision.
 _SAME: Final = 1e-6
 
 

@@ -167,8 +167,8 @@ def transplant(
         A new model of the same class and settings; the source model is untouched.
 
     Raises:
-        TransplantError: If the policy is of another kind, SAC would have to scale an action, or
-            only the target normalises its observations and its statistics are still updated.
+        TransplantError: If the policy is of another kind, SAC would have to scale an action, action
+            noise is not restated, or only the target normalises, with changing statistics.
         SpaceMismatch: If a space does not have the size of its layout.
     """
     check_supported(source_model)
