@@ -51,7 +51,7 @@ def test_demonstrations_pair_images_with_intended_actions() -> None:
     assert shown.pictures.shape == (150, 12, 20, 3)
     assert shown.episodes == (20,) * 7 + (10,)
     bright = shown.pictures[:, 6, :, 0].argmax(axis=1)
-    left = bright < 8  # The env is right of the middle, and must go left.
+    left = bright < 8  # The place is right of the middle, so the action must go left.
     right = bright > 9
     assert left.any()
     assert right.any()
@@ -207,7 +207,7 @@ def test_the_clones_of_the_package_are_sources(vehicle: str) -> None:
 
 @pytest.fixture(scope="module")
 def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a clone of the demonstrator on the dry lane."""
+    """The file of a clone of the demonstrator on the dry lane."""
     folder = tmp_path_factory.mktemp("clone")
     shown = SharedFile(folder / "shown.npz", 3)
     policy = CloneLearner("cloning", QUICK_CLONING).train(DRY, 40, 3, demonstrations=shown)
@@ -217,7 +217,7 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a policy of a pendulum trained with PPO."""
+    """The file of a policy of a pendulum, trained with PPO."""
     path = tmp_path_factory.mktemp("ppo") / "pole.safetensors"
     save_policy(Sb3Learner("tiny", TINY).train(SMALL, 32, 3), path)
     return path

@@ -70,7 +70,7 @@ def test_failed_jobs_are_reported_and_others_continue(
     assert "crash (Traceback" in text
     assert "ZeroDivisionError: a bug" in text
     assert "vanish (its process was lost 3 times, at last with exit code -9)" in text
-    assert "These need them: needs." in text
+    assert "These come after them: needs." in text
     assert "crash failed: ZeroDivisionError: a bug" in caplog.messages
     assert seen == ["others"]
     assert attempts.read_text() == "attempt\n" * 3

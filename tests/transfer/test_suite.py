@@ -119,7 +119,7 @@ def test_runs_of_a_target_are_shared(out: Path) -> None:
     assert parallel.summaries == alone.summaries
 
 
-def test_nothing_is_shared_by_studies_of_other_bodies(out: Path) -> None:
+def test_nothing_is_shared_if_source_and_target_are_swapped(out: Path) -> None:
     assert _requested(_plan(WET, DRY), out) == _names(*_KINDS)
 
 

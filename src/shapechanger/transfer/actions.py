@@ -23,7 +23,7 @@ class ActionScale(NamedTuple):
     """The scale of a model's actions: action of the env = middle + half * action of the model.
 
     Each array has the shape (n,) and the unit of each action; `half` is above zero. Actions of the
-    env are clipped to `low` and `high`.
+    env are clipped to `low` and `high`, unless the whole scale is the identity.
     """
 
     middle: _Array
@@ -35,8 +35,8 @@ class ActionScale(NamedTuple):
     def between(cls, space: Any, layout: Layout) -> ActionScale:
         """Return the scale from a model's own action space to the range of a layout.
 
-        It is the identity if both ranges are equal, as for policies that were trained without a
-        scale, and for actions that have no finite range in the space or in the layout.
+        An action is not scaled if its two ranges are equal, as for policies that were trained
+        without a scale, or if it has no finite range in the space or in the layout.
         """
         box = cast("Box[Any]", space)
         # Bounds of a space are in single precision, bounds of a layout in double.
@@ -57,7 +57,7 @@ class ActionScale(NamedTuple):
         return not self.middle.any() and bool((self.half == 1.0).all())
 
     def to_env(self, actions: NDArray[Any]) -> NDArray[Any]:
-        """Return a model's actions, shape (..., n), in the units of the env and in its range."""
+        """Return a model's actions, shape (..., n), in the units of the env; see the class."""
         if self.is_identity:
             return actions
         scaled = np.clip(self.middle + self.half * actions, self.low, self.high)
@@ -70,7 +70,7 @@ class ActionScale(NamedTuple):
         return ((actions - self.middle) / self.half).astype(actions.dtype)
 
     def of_squashed(self, space: Any) -> tuple[_Array, _Array]:
-        """Return middle and half width, (n,), of the env's actions for a bounded model space."""
+        """Return the middle and half width, each (n,), of a bounded model space in env units."""
         box = cast("Box[Any]", space)
         low, high = box.low.astype(np.float64), box.high.astype(np.float64)
         return (self.middle + self.half * (0.5 * (low + high)), self.half * (0.5 * (high - low)))
@@ -82,7 +82,7 @@ def learners_space(space: Any) -> Box[np.float32]:
 
 
 def require_ranges(env: str, space: Any, layout: Layout) -> None:
-    """Refuse actions whose range is unknown or differs from their layout."""
+    """Refuse actions whose range is infinite or empty, or differs from the range in the layout."""
     box = cast("Box[Any]", space)
     names = [feature.name for feature in layout for _ in range(feature.size)]
     for name, low, high, stated_low, stated_high in zip(
@@ -91,7 +91,7 @@ def require_ranges(env: str, space: Any, layout: Layout) -> None:
         if not np.isfinite([low, high]).all() or not low < high:
             raise SpaceMismatch(
                 f"The action {name!r} of {env} ranges from {low:g} to {high:g}, and a learner "
-                "explores over a finite range: give its action space and its layout one."
+                "needs a finite range that is not empty: give its action space and its layout one."
             )
         if not np.allclose((low, high), (stated_low, stated_high)):
             raise SpaceMismatch(

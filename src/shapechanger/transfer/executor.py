@@ -32,8 +32,8 @@ OnProgress = Callable[[str, int, bool], None]
 class Job:
     """A call of a module-level function in a process, with `arguments` and a `ReportSteps`.
 
-    The job starts when the jobs named in `after` have ended. If its process is lost, the job is
-    repeated up to `attempts` times; a job that raises is not repeated.
+    The job starts when the jobs of the run that `after` names have succeeded. If its process is
+    lost, the job starts again, up to `attempts` times in all; a job that raises is not repeated.
     """
 
     name: str
@@ -51,8 +51,8 @@ the failure or None, and for "lost" how the process was lost."""
 class Executor:
     """Runs jobs in the order of their dependencies; subclasses define where jobs run.
 
-    If a job fails, only the jobs that need its result are skipped. A job is repeated if its process
-    is lost.
+    If a job fails, the jobs after it are skipped, and the others run. If a job raises an
+    `OutputError`, all jobs end. For lost processes, see `Job`.
     """
 
     # Maximum number of jobs that run at the same time; None for no limit.
@@ -109,7 +109,7 @@ class Executor:
             skipped = ", ".join(job.name for job in waiting)
             raise FailedRuns(
                 f"These runs failed: {'; '.join(reasons)}. "
-                + (f"These need them: {skipped}. " if skipped else "")
+                + (f"These come after them: {skipped}. " if skipped else "")
                 + "All others have ended; the same command tries these again."
             )
 
@@ -120,7 +120,7 @@ class Executor:
         raise NotImplementedError
 
     def _events(self) -> Iterable[Event]:
-        """Wait for events of the running jobs, and return them."""
+        """Wait for events of the running jobs, and return them; there may be none."""
         raise NotImplementedError
 
     def _close(self) -> None:
@@ -128,7 +128,7 @@ class Executor:
 
 
 def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
-    """Return a callback that forwards at most one report of steps every `every_s` seconds."""
+    """Return a callback that forwards a report at most every `every_s` s, and drops the others."""
     last = 0.0
 
     def forward(steps: int) -> None:
@@ -179,7 +179,7 @@ class Processes(Executor):
     """Runs jobs in worker processes of this machine, which end with their parent.
 
     A script that uses this class must guard its entry point with `if __name__ == "__main__":`,
-    because processes are spawned. `workers` is their number; None for one per core.
+    because processes are spawned. At most `workers` run at once; None for one per core.
     """
 
     def __init__(self, workers: int | None = None) -> None:

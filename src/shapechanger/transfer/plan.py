@@ -54,12 +54,12 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         unit: Unit of the measure.
         learner: Name of the learner.
         settings: Settings of the learner, the same in every arm.
-        steps: Target steps of each run of scratch and fine-tune.
+        steps: Target steps of each run of an arm that learns on the target, such as scratch.
         source_steps: Training steps of each source policy.
         own_steps: Training steps of methods that train their own policy in the source, such as
             identified, if a source policy is given; 0 for `source_steps`.
-        seeds: Number of runs of each arm.
-        arms: Names of the methods to compare; scratch is always included, because all others are
+        seeds: Number of runs of each arm; 1 for zero-shot with a given policy and a single target.
+        arms: Names of the methods to compare; scratch must be among them, because all others are
             compared with it.
         seed: The seed from which the seeds of all runs are drawn.
         source_policy: SHA-256 of the given policy file; empty if the study trains one for each
@@ -74,8 +74,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
             `shapechanger.transfer.runs`; a study cannot be resumed with other identities.
 
     Raises:
-        StudyError: If there are fewer than two seeds, scratch or a second arm is missing, or the
-            seed is not a whole number from 0 to 2^32 - 1.
+        StudyError: If there are fewer than two seeds, scratch or a second arm is missing, an arm is
+            named twice, or the seed is not a whole number from 0 to 2^32 - 1.
         UnknownName: If an arm is not the name of a method.
     """
 
@@ -117,7 +117,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         wanted = [*NO_SKILL, *self.arms]
         if not given and any(load_method(arm).uses_source_policy for arm in self.arms):
             wanted.insert(0, SOURCE)
-        # Every run of a given policy has the same result, and so has every run of the zero action.
+        # A given policy has the same result in every run; one run of the zero action is enough.
         once = set[str]() if self.individual else {"zero-action"}
         if given and not self.individual:
             once.add("zero-shot")

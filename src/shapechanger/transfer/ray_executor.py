@@ -33,8 +33,9 @@ _ray: Any = ray
 class RayCluster(Executor):
     """Runs jobs on the nodes of a Ray cluster, one job per core.
 
-    The address is such as `10.0.0.1:6379`, or "auto" for this machine's cluster; None starts Ray on
-    this machine for the duration of the study.
+    The address is such as `10.0.0.1:6379`, or "auto" for this machine's cluster. None uses this
+    machine's cluster, or starts Ray here for the study. If Ray already runs in this process, the
+    address is ignored.
     """
 
     def __init__(self, address: str | None = None) -> None:
@@ -83,7 +84,7 @@ class RayCluster(Executor):
 
 
 def _require_answer(address: str) -> None:
-    """Refuse an address where nothing listens; Ray itself would retry for half a minute."""
+    """Refuse an address that is malformed, or where nothing listens: Ray would retry for 30 s."""
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit() or "/" in host:
         raise StudyError(

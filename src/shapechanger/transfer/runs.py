@@ -1,7 +1,7 @@
-"""The runs of a study, each in its own process, their results, and the identities of their parts.
+"""The runs of a study, their results, and the identities of their parts.
 
-All random numbers of a run derive from the seed of the run. The keys of identities are "source",
-"target", "learner", and "method NAME" for each arm.
+Random numbers of a run derive from its seed, except in evaluations of policies and in
+demonstrations that runs share. Keys of identities: "source", "target", "learner", "method NAME".
 """
 
 from __future__ import annotations

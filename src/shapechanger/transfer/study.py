@@ -71,8 +71,8 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
         machine: Operating system and processor architecture of the machine.
         shift: The certificate of the shift as text; empty if the envs publish none.
         runs: Every run with its learning curve.
-        source_return: Mean return of the source policies in the source, one for each seed; empty
-            if a policy was given.
+        source_return: Mean return of each source policy in the source, one for each seed; empty if
+            the study trained none.
         summaries: Measures of transfer of each arm except scratch.
         looks: Numbers of seeds at which the result was computed, the present one last. With more
             than one, seeds were added after results had been computed.
@@ -89,7 +89,7 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def headline_arm(self) -> str:
-        """The arm that is compared with scratch first: fine-tune, or else the first that learns."""
+        """The arm to compare with scratch first: fine-tune, or one that learns, or the first."""
         if "fine-tune" in self.summaries:
             return "fine-tune"
         learning = (arm for arm in self.summaries if self.curves(arm).n_evals > 1)
@@ -122,7 +122,7 @@ class TaskTraits(NamedTuple):
 
 
 def inspect_task(task: TransferTask) -> TaskTraits:
-    """Make both envs of a task once, and read their traits for a study.
+    """Make both envs of a task, and read their traits for a study.
 
     Raises:
         EmptyShift: If source and target do not differ.
@@ -176,9 +176,9 @@ def make_plan(
         source_policy: File of a given source policy; None to train one for each seed.
         arms: Names of the methods to compare.
         seed: The seed from which the seeds of all runs are drawn.
-        rules: Rules of the body map for entries without a partner, see `BodyMap.between`.
+        rules: Rules of the body map, see `BodyMap.between`.
         map_text: The body map as TOML, instead of `rules` and `units`.
-        units: "same" or "torque", see `BodyMap.between`.
+        units: "same", "torque" or "exact", see `BodyMap.between`.
         measure: Name of a measure of the target, of one of its reward terms, or "return"; empty
             for the target's default.
         traits: Result of `inspect_task` for the task; None to inspect it now.
@@ -186,11 +186,13 @@ def make_plan(
     Raises:
         UnknownName: If an env, an arm, a measure or a feature does not exist.
         MapError: If the spaces cannot be mapped.
-        StudyError: If the budget or the number of seeds is too small, the given policy belongs to
-            another kind of learner, or an env does not fulfil the learner's requirements.
-        PolicyError: If the given policy is missing, corrupt or refused.
-        SpaceMismatch: If the given policy belongs to another body, or a layout does not fit its
+        StudyError: If the budget or the number of seeds is too small, or if the learner or an arm
+            cannot be used with these envs.
+        PolicyError: If the given policy is missing, corrupt, or of another kind of learner.
+        SpaceMismatch: If the given policy was trained in another env, or a layout does not fit its
             space.
+        ForeignStudy: If the source has changed since the given policy was trained.
+        EmptyShift: If source and target do not differ; only without `traits`.
     """
     budget, source_budget = study_budgets(
         settings, steps, source_steps, is_given=source_policy is not None

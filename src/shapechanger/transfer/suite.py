@@ -1,8 +1,8 @@
 """Suites: several studies that share the runs of their targets and sources.
 
 Training from scratch on a target does not depend on the source, and a source policy does not depend
-on the target. The seed of a run depends on its kind and index only. So a study copies these runs,
-if they have ended, from the other studies of its suite.
+on the target. The seed of a run depends only on its kind and index, and on the study's seed. So a
+study copies these runs, if they have ended, from studies of its suite with the same settings.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _DEMONSTRATIONS: Final = "demonstrations"
 
 
 class StudyOutcome(msgspec.Struct, frozen=True):
-    """Outcome of one study of a suite, in steps on the target.
+    """Outcome of one study of a suite; all steps are target steps.
 
     Attributes:
         final: Mean measure of scratch at its last evaluation.

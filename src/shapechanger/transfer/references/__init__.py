@@ -19,7 +19,7 @@ FOLDER: Final = Path(__file__).parent
 
 
 class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
-    """Measured values of an env, with the learner, env steps and seeds of each training.
+    """Measured values of an env, with the learner, env steps and seeds of its trainings.
 
     Attributes:
         floor: Values of each measure without skill: for random actions and for the action zero.
@@ -43,7 +43,7 @@ class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def text(self) -> str:
-        """Origin of the policy as text."""
+        """Learner, steps and number of seeds of the reference, as text."""
         return f"the reference ({self.learner}, {self.steps:,} steps, {len(self.seeds)} seeds)"
 
 
