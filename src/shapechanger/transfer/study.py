@@ -309,6 +309,7 @@ def run_study(
     Raises:
         EmptyShift: If source and target do not differ.
         OutputError: If `out` cannot be written; finished runs are kept.
+        StudyError: If `source_policy` is not the planned one, or a result is missing in the end.
         ForeignStudy: If `out` contains another study or other files.
         CorruptStudy: If a file in `out` cannot be read.
         FailedRuns: If runs have failed; all runs that do not depend on them have ended.

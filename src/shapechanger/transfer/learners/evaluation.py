@@ -77,7 +77,7 @@ def evaluation_seed(env: EnvRef, episodes: int) -> int:
 def evaluation_envs(
     env: EnvRef, episodes: int, limit: int | None = None
 ) -> list[gym.Env[Any, Any]]:
-    """Make the envs that evaluate a learner's policies, with held-out surroundings if available."""
+    """Make an env per episode, or the only possible one, with held-out surroundings if any."""
     more = {} if limit is None else {"max_episode_steps": limit}
     envs = [env.make(**more)]
     if not is_single_instance(envs[0]):

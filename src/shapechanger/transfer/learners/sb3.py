@@ -58,7 +58,7 @@ class Sb3Learner(Learner[Sb3Settings]):
     """Any algorithm of Stable-Baselines3."""
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
-        """Refuse an env whose spaces are not flat boxes of the sizes of its layouts."""
+        """Refuse spaces that are no flat boxes of the layouts' sizes, and unbounded actions."""
         check_size(f"observation of {env}", traits.observation_space, traits.observation_layout)
         check_size(f"action of {env}", traits.action_space, traits.action_layout)
         require_ranges(env.id, traits.action_space, traits.action_layout)

@@ -142,9 +142,9 @@ def transplant(
     untrained policy. A constant action gets the mean log standard deviation of the source, so that
     it is explored.
 
-    If the target env normalises observations with `VecNormalize`, its statistics are replaced by
-    the source's, see `transplant_normalisation`. Otherwise the first layer absorbs the source's
-    statistics, which is exact up to the clipping of `VecNormalize`.
+    If source and target env normalise observations, the source's statistics replace the target's,
+    see `transplant_normalisation`. If only the source does, the first layer absorbs its statistics,
+    which is exact up to the clipping of `VecNormalize`.
 
     The map is in the units of the layouts. A model with another action space scales its actions to
     the ranges of the layout, see `shapechanger.transfer.actions`. PPO's actions are mapped
