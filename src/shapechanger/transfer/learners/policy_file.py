@@ -351,7 +351,7 @@ def convert_zip(
 
     Raises:
         PolicyError: If the file is missing, not a zip of a model, or has another kind of model.
-        TransplantError: If the model has gSDE or another features extractor.
+        TransplantError: If the model has discrete actions, gSDE or another features extractor.
         SpaceMismatch: If the layouts do not fit the policy's spaces.
     """
     model = _read_zip(path)
