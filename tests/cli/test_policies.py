@@ -88,7 +88,7 @@ def test_a_zip_of_stable_baselines3_is_converted(
         (SAC, {"policy_kwargs": {"n_critics": 3}}, "These policy_kwargs change the networks"),
         (SAC, {"policy_kwargs": {"activation_fn": nn.Tanh}}, "layers must be the same, with ReLU"),
         (A2C, {}, "is of another algorithm or policy class"),
-        (PPO, {"policy_kwargs": {"net_arch": {"pi": [8], "vf": [9]}}}, "both must be the same"),
+        (PPO, {"policy_kwargs": {"net_arch": {"pi": [8], "vf": [9]}}}, "layers must be the same"),
     ],
 )
 def test_zips_that_do_not_fit_are_refused(
