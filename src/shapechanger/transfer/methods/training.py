@@ -100,7 +100,8 @@ class MappedTeacher:
     def __init__(self, act: Act, body_map: BodyMap) -> None:
         self._act, self._map = act, body_map
         taught = [not isinstance(entry.rule, Learn) for entry in body_map.action]
-        self.taught: NDArray[np.bool_] = np.array(taught)
+        sizes = [feature.size for feature in body_map.target_action]
+        self.taught: NDArray[np.bool_] = np.repeat(taught, sizes)
 
     def __call__(self, observations: NDArray[Any]) -> NDArray[np.float32]:
         """Return actions of shape (n, target actions) for the target's observations."""
