@@ -54,7 +54,7 @@ def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
     A network may block multicast DNS; connecting by address works nevertheless.
 
     Args:
-        timeout_s: Time to listen, s.
+        timeout_s: Time to listen, and time limit to resolve each robot's address, s.
         zeroconf: A `zeroconf.Zeroconf` to use; None for a new one.
     """
     names: set[str] = set()

@@ -41,8 +41,8 @@ class Clock:
                 time stands still.
 
         Returns:
-            False if only the limit was reached. On a twin, whose time advances in steps, True
-            exactly at each step.
+            False if only the limit was reached. On a twin's own clock, True exactly if the board
+            has ended the wait, at a tick or another event.
         """
         left_s = min((until_ns - time.monotonic_ns()) / 1e9, at_most_s)
         poll = select.poll()
@@ -135,7 +135,7 @@ class Hardware:
         return open_port(settings)
 
     def close(self) -> None:
-        """Close all devices."""
+        """Close the pins; whoever opened a bus or port closes it."""
         if self._pin_factory is not None:
             self._pin_factory.close()
             self._pin_factory = None

@@ -64,9 +64,9 @@ class LowAtOnceFactory(LGPIOFactory):
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
         """Send servo pulses on a pin from the next cycle on; a width of 0 stops them at once.
 
-        The pin stays a low output until the factory is closed. The timing jitters, according to
-        lgpio's documentation; a PCA9685 or the kernel's PWM (`over = "sysfs"`) is steadier. Widths
-        are 500 to 2500 us, frequencies 40 to 500 Hz.
+        Without pulses the pin is a low output until the factory is closed. The timing jitters,
+        according to lgpio's documentation; a PCA9685 or the kernel's PWM (`over = "sysfs"`) is
+        steadier. Widths are 500 to 2500 us, frequencies 40 to 500 Hz.
         """
         if self._handle is None:
             raise OSError("the pins are closed")

@@ -38,8 +38,8 @@ from shapechanger.robot.twin.start import BoardAt, Place, find_board, start_boar
 _HERE: Final = "127.0.0.1"
 _EVERYWHERE: Final = "0.0.0.0"
 _PILOT: Final = "shapechanger.vehicles.remote.pilot"
-# Longest silence of a twin's guard. The clock of a twin is paused while the twin renders, and a
-# guard that waits for the clock is alive.
+# Longest silence of the guard with `--clock twin`, ms. This clock is paused while the twin renders,
+# and a guard that waits for it is silent without having failed.
 _TWIN_PATIENCE_MS: Final = 10_000
 
 
@@ -49,7 +49,8 @@ class Service:
 
     twin: bool = False
     """Run on simulated pins and in a simulated world instead of this machine's pins. The robot is
-    then stored as a known robot, unless another one has its name."""
+    then stored as a known robot, unless another one has its name, --insecure is given, or both
+    --credentials and --port 0 are."""
     host: str = ""
     """Address to listen at; all of this machine's if not given, only 127.0.0.1 with --twin or
     --insecure."""
@@ -67,7 +68,7 @@ class Service:
     insecure: bool = False
     """Serve without TLS. The key is still needed."""
     credentials: Path | None = None
-    """Folder of the robot's key and certificate; the folder that `init` made if not given."""
+    """Folder of key and certificate, which a twin makes if needed; `init`'s folder if not given."""
     arm_by_program: bool = False
     """Let programs arm the robot. By default only persons may; on a twin anyone may."""
     announce: bool = True
@@ -146,10 +147,10 @@ class Service:
         return ServePlan(guard, fields, board.hardware, patience_ms=patience_ms)
 
     def make_known(self, name: str, plan: ServePlan, port: int) -> str:
-        """Store a twin as a known robot; return a message about it, or "" if it is not stored.
+        """Store a twin as a known robot, see `store`, and return a message about it.
 
-        A twin is not stored if it has no TLS, or if `credentials` is given and the system chose
-        the port.
+        Do nothing and return "" if the twin has no TLS, if `credentials` is given and the system
+        chose the port, or if the name cannot be a file name.
         """
         if self.insecure or (self.credentials is not None and not self.port):
             return ""
@@ -182,7 +183,7 @@ def recordings_folder(name: str) -> Path:
 
 
 def store(robot: KnownRobot) -> str:
-    """Store a local robot among the known robots, unless its name is taken.
+    """Store a local robot, unless its name is taken or it is known at an address of a network.
 
     Returns:
         Summary message.

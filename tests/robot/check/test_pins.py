@@ -1,4 +1,4 @@
-"""Pins of a robot, the test of two pins that a wire joins, and LEDs instead of motors."""
+"""Pins of a robot: a wire between two free ones, the pin to probe, LEDs instead of motors."""
 
 from collections.abc import Callable, Iterator
 

@@ -255,9 +255,7 @@ def test_the_servos_of_a_rig_answer() -> None:
         ("cat", {25: False}, "bad: GPIO25, OE of the servo board, is held low: fit 10 kOhm to"),
     ],
 )
-def test_missing_and_wrong_resistors_are_bad(
-    kind: str, held: dict[int, bool], expected: str
-) -> None:
+def test_only_the_right_resistor_is_good(kind: str, held: dict[int, bool], expected: str) -> None:
     """A pin that follows the Pi's own resistor has no external one."""
     pins = HeldPins(MockPin)
     for pin, level in held.items():
@@ -278,7 +276,7 @@ def test_the_wiring_is_examined_on_a_computer(tmp_path: Path, car: Profile) -> N
 
     wiring = {"resistors", "emergency button", "sensor"}
     assert wiring <= checks().keys()
-    # With `motors_off`, the finding explains why the resistors are not tested.
+    # Without pins, the finding explains why the resistors are not tested.
     without_pins = checks(root=tmp_path / "workstation")
     assert without_pins["resistors"].sentence == "Not tested: this computer has no pins."
     assert wiring & without_pins.keys() == {"resistors"}

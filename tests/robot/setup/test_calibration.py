@@ -42,7 +42,7 @@ def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
 
 
 def test_impossible_measurements_are_refused() -> None:
-    """A middle beyond an end, a motor that starts at its full duty, and an encoder's wrong wire."""
+    """A middle at an end, a motor that starts at its full duty, and an encoder's wrong wire."""
     with pytest.raises(RobotError, match="must lie between"):
         pulse_changes(_SERVO, (0.2, 0.2, 0.2))
     for duty in (-0.1, 1.0, 2.0):

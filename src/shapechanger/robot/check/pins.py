@@ -22,7 +22,7 @@ _SETTLES_S: Final = 0.002
 
 
 def require_pins(plan: GuardPlan) -> None:
-    """Refuse a machine without GPIO pins."""
+    """Refuse a machine without GPIO pins, if the robot's outputs or enable line need some."""
     if needs_pins(plan) and not any(Path("/dev").glob("gpiochip*")):
         raise RobotError(
             f"{plan.name} uses GPIO pins, and this machine has none (no /dev/gpiochip0): "
@@ -60,7 +60,7 @@ def _require_free_pin(pin: int, plan: GuardPlan) -> None:
 
 
 def probed_pin(plan: GuardPlan, probe: int) -> int:
-    """Return the BCM pin to connect a probe to: the one that drives a motor forward."""
+    """Return the BCM pin to probe, which is low at rest, and driven while a motor runs forward."""
     _require_free_pin(probe, plan)
     for output in plan.outputs:
         weight = output.mix.get("throttle", 0.0)
@@ -111,7 +111,7 @@ def pin_level(pin: int, hardware: Hardware, *, pull_up: bool) -> int:
         return int(device.is_active != pull_up)
 
 
-SHOWN_S: Final = 0.5  # Time for which an LED is lit if no person is asked, s.
+SHOWN_S: Final = 0.5  # Time for which an LED is lit if no person answers, s.
 # Function that asks a person a question; it returns None without an answer.
 Ask = Callable[[str], bool | None]
 
@@ -127,7 +127,7 @@ class BenchLamp(NamedTuple):
 
 
 def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
-    """Return the LEDs of a bench, in the order of the outputs."""
+    """Return the LEDs of a bench: for each output in order, then for the enable line."""
     found: list[BenchLamp] = []
     for output in plan.outputs:
         name, settings, lights = output.name, output.settings, OUTPUTS[output.driver].lights
@@ -154,7 +154,7 @@ def check_lamps(
     sees: Callable[[BenchLamp], bool | None],
     shown_s: float = SHOWN_S,
 ) -> Iterator[Finding]:
-    """Light each LED alone, and ask or measure whether it is lit.
+    """Light each LED alone, ask whether it is lit, and measure it if possible.
 
     `connect_pins` opens the pins and buses, which no other program may use meanwhile. `sees`
     measures whether an LED is lit, and returns None if it cannot.
@@ -162,7 +162,7 @@ def check_lamps(
     for lamp in lamps_of(plan):
         check = f"LED {lamp.place}"
         try:
-            # Opened afresh, because a closed output stays claimed.
+            # Opened again for each LED: pins stay claimed until the hardware is closed.
             with closing(connect_pins()) as hardware, _lit(lamp, plan, hardware):
                 answer = ask(f"Is the LED on {lamp.place} lit ({lamp.name})?")
                 if answer is None:

@@ -23,7 +23,7 @@ from shapechanger.robot.setup.install import Machine
 
 Level = Literal["good", "bad", "unknown"]
 Result = tuple[Level, str]  # A level and a sentence.
-Results = Iterable[Result]  # A check: an iterator that performs it and yields its results.
+Results = Iterable[Result]  # A check: iterating over it performs it.
 Checks = Iterable[tuple[str, Results]]  # Names and checks, which are performed one by one.
 MARKS: Final[dict[Level, str]] = {"good": "good", "bad": "BAD", "unknown": "?"}
 
@@ -104,8 +104,8 @@ def write_report(
     """Run the parts of a check, and report each finding as it comes.
 
     Return whether no finding was bad. `say` shows a person each line. The file at `path`, if any,
-    begins with the `head`, and lacks the names of the computer and its user. If it exists, a number
-    is added to the name.
+    begins with a title and the `head`; in the findings, the names of the computer and its user are
+    replaced. If the file exists, a number is added to the name.
     """
     if path is not None:
         names = (path.with_stem(f"{path.stem}-{number}") for number in count(2))

@@ -81,7 +81,7 @@ class StandingRobot:
 
 
 def examine(robot: StandingRobot) -> Iterator[Finding]:
-    """Check all requirements of a robot's safety and function, without moving it.
+    """Check a robot's settings, computer and wiring, as far as possible without moving it.
 
     A check that fails or hangs yields a finding, and the next check begins.
     """
@@ -233,7 +233,7 @@ def _geometry(plan: CameraPlan) -> Result:
 
 
 def _close(robot: StandingRobot) -> Results:
-    """Close the pins and buses, which may hang."""
+    """Close the pins and buses, or report that they were left alone; closing may hang."""
     if robot.port_error:
         yield "unknown", "The robot may be served now, so its pins and buses were left alone."
     if "pins" in vars(robot):
@@ -329,7 +329,7 @@ def _servo_board(robot: StandingRobot, bus: int, address: int) -> Results:
 
 
 def _servo_bus(robot: StandingRobot) -> Results:
-    """Check that every servo of the bus answers and has the model of the profile; no torque."""
+    """Check, without torque, that every servo answers and has the model of the profile."""
     servos = tuple(output for output in robot.profile.outputs if output.driver == DRIVER)
     if not all(map(stops_itself, servos)):
         yield "unknown", "Not tested: these servos have power only while the enable line is on."

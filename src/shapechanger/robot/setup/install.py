@@ -46,7 +46,7 @@ def _text(path: Path | None) -> str:
 
 
 def needs_pins(guard: GuardPlan) -> bool:
-    """Return True if a robot needs its computer's own pins, to move or to stop."""
+    """Return True if a robot's outputs or enable line need its computer's own pins."""
     return guard.enable_pin is not None or any(
         output.driver in {"hbridge", "phase_enable"}
         or output.settings.get("over") == "lgpio"
@@ -87,7 +87,7 @@ def unit_word(text: str) -> str:
 def write_unit(
     robot: str, profile: Path, credentials: Path | None = None, user: str = ""
 ) -> tuple[Path, bool]:
-    """Write the unit next to a profile unless it exists; return it and whether it is new.
+    """Write the unit next to a profile unless it exists; return its path and whether it is new.
 
     The profile need not exist yet. The service runs as `user`, by default the current one, who must
     be a member of the groups of the robot's devices.
@@ -312,7 +312,7 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
         return SystemChange(name, state, is_made, commands, otherwise, restarts=True)
 
     if needs_pins(profile):
-        state = "The pins of a process go low when it dies."
+        state = "The pins of a process become inputs when it dies, so pull-downs make them low."
         is_strict = partial(machine.sets, "strict_gpiod")
         yield line("strict_gpiod", state, "dtparam=strict_gpiod", is_strict)
     for device in (name for name, group in device_groups(profile).items() if group == "i2c"):
@@ -327,7 +327,7 @@ def settings_of_computer(profile: Profile, machine: Machine) -> Iterator[SystemC
             reason = f"Bus {bus} needs an overlay for its pins, such as dtoverlay=i2c{bus}."
             yield SystemChange(f"I2C bus {bus}", state, exists, instead=reason)
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
-        state, text = f"The I2C bus has {_FAST_HZ} bits per second.", f"i2c_arm_baudrate={_FAST_HZ}"
+        state, text = f"I2C bus 1 has {_FAST_HZ} bits/s or more.", f"i2c_arm_baudrate={_FAST_HZ}"
 
         def is_fast() -> bool:
             speed = machine.settings().get("dtparam.i2c_baudrate", "")
