@@ -115,7 +115,7 @@ MISTAKES = (
     ("key test-car --credentials nowhere", "nowhere/key does not exist"),
     ("stop nobody", "No known robot matches 'nobody'"),
     ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),
-    ("remember ../one 127.0.0.1 --fingerprint insecure", "robot's name has up to 64"),
+    ("remember ../one 127.0.0.1 --fingerprint insecure", "name must have 1 to 64"),
     ("find --seconds 0", "must be above 0 and at most 60"),
 )
 

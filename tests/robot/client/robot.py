@@ -74,7 +74,7 @@ class Robot:
     refusal: str = ""  # Reason for which each command is refused; "" to accept commands.
     held_by: str = ""  # Another client in control.
     absent: tuple[str, ...] = ()  # Features of the state without a measurement.
-    arm_by_itself: bool = False  # Arms when a client takes control.
+    arm_by_itself: bool = False  # Arms when a client takes control, and stays armed.
     home_at_take: bool = False  # Returns to its start when a client takes control.
     armed: bool = False
     emergency: bool = False

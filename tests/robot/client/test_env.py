@@ -111,7 +111,7 @@ def test_the_reward_is_metres_forward(run: Run, started: Made) -> None:
     encoder = dict.fromkeys(("speed", "stall"), "encoder")
     assert info["reward_sources"] == encoder | {"collision": "bumper"}
     answers = [command.answers for command in robot.received(m.Command)]
-    assert answers == sorted(set(answers))  # Each command answers the previous observation.
+    assert answers == sorted(set(answers))  # Each command answers a newer observation.
 
 
 def test_a_collision_costs_once_and_ends_the_episode(run: Run, started: Made) -> None:

@@ -23,7 +23,7 @@ def test_the_inbox_holds_only_the_newest_observation() -> None:
     assert (found.message.seq, found.received_at) == (3, 5.0)
 
 
-def test_an_observation_is_returned_once() -> None:
+def test_without_a_newer_observation_the_error_states_the_age() -> None:
     now = [10.0]
     inbox = Inbox(lambda: now[0], 1.0)
     inbox.put(seen(1))

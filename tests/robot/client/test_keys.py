@@ -148,7 +148,7 @@ def test_the_terminal_is_unbuffered_and_restored(typed: tuple[int, Terminal]) ->
 
 
 @pytest.mark.parametrize(("sequence", "key"), ARROWS.items())
-def test_an_arrow_is_one_key_however_it_is_split(sequence: bytes, key: str) -> None:
+def test_an_arrow_is_one_key_unless_a_pause_follows_its_escape(sequence: bytes, key: str) -> None:
     for place in range(1, len(sequence)):
         for gap_s in (0.0, 0.9 * ESCAPE_WAIT_S, 0.9 * REST_WAIT_S):
             keys = pieces((sequence[:place], sequence[place:]), gap_s)
@@ -157,7 +157,7 @@ def test_an_arrow_is_one_key_however_it_is_split(sequence: bytes, key: str) -> N
 
 
 @pytest.mark.parametrize("sequence", UNKNOWN, ids=repr)
-def test_an_unknown_sequence_is_no_key_however_it_is_split(sequence: bytes) -> None:
+def test_an_unknown_sequence_gives_at_most_a_stop_however_it_is_split(sequence: bytes) -> None:
     assert set(pieces([sequence], 0.0)) == {OTHER}
     splits = [(sequence[:place], sequence[place:]) for place in range(1, len(sequence))]
     for parts in (*splits, [bytes([byte]) for byte in sequence]):
@@ -240,7 +240,7 @@ def test_a_stop_has_many_encodings(sequence: bytes, key: str) -> None:
         (b"wwwa\r", ["w", "w", "w", "a", "enter"]),
     ],
 )
-def test_a_read_with_many_different_keys_moves_no_action(
+def test_a_read_of_three_different_keys_moves_no_action(
     typed: tuple[int, Terminal], data: bytes, keys: list[str]
 ) -> None:
     keyboard, terminal = typed
@@ -255,7 +255,7 @@ def pieces(parts: list[bytes] | tuple[bytes, ...], gap_s: float) -> list[str]:
     return keys + parser.expire(len(parts) * gap_s + REST_WAIT_S)
 
 
-def test_a_held_escape_stops_at_once() -> None:
+def test_a_held_escape_stops_within_a_tenth_of_a_second() -> None:
     parser, now_s = KeyParser(), 0.0
     while "escape" not in parser.feed(b"\x1b", now_s):
         now_s += 0.033

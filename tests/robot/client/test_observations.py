@@ -40,7 +40,7 @@ def seen(frame_seq: int, jpeg: bytes | None) -> Received:
     return Received(message, 0.0, jpeg)
 
 
-def test_a_frame_is_upright_rgb() -> None:
+def test_a_frame_is_rgb_and_not_mirrored() -> None:
     shown = spaces().view(seen(1, picture((160, 120), number=10))).observation
     assert shown.shape == (12, 16, 3)
     assert shown.dtype == np.uint8

@@ -29,7 +29,7 @@ SENSED = {"speed": 0.5, "collision": 0.0, "stall": 0.0, "battery": 7.4}
 
 
 class Served:
-    """A daemon in its own thread; `running` may only be used on its event loop."""
+    """A daemon in its own thread; `running` may only be changed on its event loop."""
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **plan: Any) -> None:
         made = make_credentials(folder, "test car")

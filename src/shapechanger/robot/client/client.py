@@ -32,18 +32,19 @@ from shapechanger.robot.link.messages import ClientMessage, Hello, RobotMessage,
 
 _Answer = TypeVar("_Answer", bound=RobotMessage)
 
-_MARGIN_S: Final = 2.0  # Time of a call in addition to the link's time limit, s.
+_MARGIN_S: Final = 2.0  # Time that a call waits beyond the link's time limit, s.
 # Fractions of the silence timeout: when to send a ping, and how often to check.
 _PING_AFTER: Final = 0.4
 _CHECK_EVERY: Final = 0.1
-_DISK_S: Final = 30.0  # Time that a robot may take to read its disk, s.
+_DISK_S: Final = 30.0  # Time that a robot may take to read or write its disk, s.
 
 
 class RobotClient(Inbox):
     """Connection to a robot, made by `connect` and maintained by a background thread.
 
-    All methods may be called from any thread. They raise `RobotRefused` if the robot refuses, and
-    `LinkError` if the link is lost or no answer arrives in time.
+    All methods may be called from any thread. Those that wait for an answer raise `RobotRefused` if
+    the robot refuses, and `LinkError` if no answer arrives in time. Those that send raise
+    `LinkError` if the link is lost; `refusal` tells whether a command was refused.
 
     Attributes:
         welcome: Description of the robot.
@@ -128,7 +129,7 @@ class RobotClient(Inbox):
         """Take control.
 
         Raises:
-            RobotRefused: If another client keeps control.
+            RobotRefused: If the robot gives no control, for example if another client keeps it.
         """
         lease = self._ask(messages.Take(), messages.Lease)
         if not lease.mine:
@@ -174,9 +175,9 @@ class RobotClient(Inbox):
         return seq
 
     def suggest(self, values: Sequence[float], *, answers: int) -> int:
-        """Send a suggestion while another client has control; the robot only shows it.
+        """Send a suggestion, which the robot only shows; refused if this client has control.
 
-        A suggestion expires like a command, and also requests the next observation.
+        A suggestion expires at the robot's deadline, and also requests the next observation.
 
         Args:
             values: One number for each action of the robot, in the order of its action layout.
@@ -214,11 +215,11 @@ class RobotClient(Inbox):
         self._post(messages.EmergencyStop(reason=reason))
 
     def disarm(self) -> None:
-        """Keep the outputs at rest."""
+        """Disarm the robot, as a person or with control; until it is armed, its outputs rest."""
         self._post(messages.Disarm())
 
     def release(self) -> None:
-        """Give control back; the robot stops and disarms."""
+        """Give control back, if this client has it; the robot stops and disarms."""
         self._post(messages.Release())
 
     def record(self, on: bool = True, name: str = "") -> messages.RecorderState:
@@ -229,8 +230,8 @@ class RobotClient(Inbox):
             name: Title of the episode; may be empty.
 
         Raises:
-            RobotRefused: If the robot cannot record, for example on a full disk, or records
-                already.
+            RobotRefused: If the robot cannot record, for example on a full disk, records already,
+                or has nothing to end.
         """
         return self._ask(
             messages.Record(on=on, name=name),
@@ -239,14 +240,14 @@ class RobotClient(Inbox):
         )
 
     def mark(self, text: str = "") -> messages.RecorderState:
-        """Mark the newest step of the episode being recorded; raises as `record` does."""
+        """Mark the newest step of the episode being recorded; raises `RobotRefused` without one."""
         before = self.recorder.marks if self.recorder else 0
         return self._ask(
             messages.Mark(text=text), messages.RecorderState, lambda state: state.marks > before
         )
 
     def undo(self, seconds: float = 5.0) -> messages.RecorderState:
-        """Drop the newest steps of the episode being recorded; raises as `record` does.
+        """Drop the newest steps of the episode being recorded; raises `RobotRefused` without any.
 
         Args:
             seconds: Duration of the steps to drop, s, above 0.
@@ -256,7 +257,7 @@ class RobotClient(Inbox):
         return self._ask(undo, messages.RecorderState, lambda state: state.dropped > before)
 
     def browse(self, before: str = "") -> messages.Recordings:
-        """List the episodes on the robot, newest first.
+        """List up to `MAX_EPISODES` episodes on the robot, newest first; see `Recordings.more`.
 
         Args:
             before: Only episodes whose id sorts before this one; "" for the newest.
@@ -267,7 +268,7 @@ class RobotClient(Inbox):
         return self._ask(messages.Browse(before=before), messages.Recordings)
 
     def fetch(self, episode: str, first: int = 0, count: int = 1_000) -> messages.Piece:
-        """Read a part of an episode on the robot's disk; raises as `browse` does.
+        """Read a part of an episode on the robot's disk; raises `RobotRefused` if that fails.
 
         Args:
             episode: Id of the episode.
@@ -331,7 +332,7 @@ class RobotClient(Inbox):
         kind: type[_Answer],
         accepts: Callable[[_Answer], bool] = lambda _: True,
     ) -> _Answer:
-        """Send a request, and wait for its answer; a robot handles one request at a time."""
+        """Send a request, and wait for its answer; all but `Take` and `Ping` wait their turn."""
         # A field out of range is an error before anything is sent.
         messages.decode_client_message(messages.encode(message))
         is_prompt = kind in (messages.Lease, messages.Pong)
@@ -389,7 +390,7 @@ class RobotClient(Inbox):
             self.put(message)
 
     async def _watch(self) -> None:
-        """End a silent connection: if the radio fails, the robot's side cannot close it."""
+        """Ping a silent robot; at the limit, end the connection, which a dead radio leaves open."""
         loop, limit_s = asyncio.get_running_loop(), self._settings[2]
         while (silent_s := loop.time() - self._heard_at) <= limit_s:
             if silent_s > _PING_AFTER * limit_s:

@@ -148,7 +148,7 @@ class Inbox:
     """Messages of a robot, for any number of calling threads.
 
     The newest observation is in one slot, so that a slow reader never gets an old one. A robot
-    sends each frame once, so an observation that replaces an unread one takes over its frame.
+    sends each frame once; later observations of the same frame take it over from the one before.
     """
 
     def __init__(self, clock: Callable[[], float], patience_s: float) -> None:
@@ -156,7 +156,7 @@ class Inbox:
         self.heard = 0  # Number of messages so far.
         self.failure: LinkError | None = None  # Why the link is lost; None while it is up.
         self._clock = clock
-        self._patience_s = patience_s  # Default time limit of a wait.
+        self._patience_s = patience_s  # Default time limit of a wait, s.
         self._process = os.getpid()
         self._changed = threading.Condition()
         self._events: deque[messages.Event] = deque(maxlen=256)
@@ -240,7 +240,8 @@ class Inbox:
     ) -> _M:
         """Wait for a message that answers a request, which was sent after message number `since`.
 
-        Without a `timeout_s`, the link's time limit applies, and no refusal is expected.
+        With a `timeout_s`, s, a refusal is raised as `RobotRefused`. Without one, the default time
+        limit applies, and refusals are ignored.
         """
 
         def find() -> _M | messages.Refused | None:
@@ -257,14 +258,14 @@ class Inbox:
         return found
 
     def events(self) -> list[messages.Event]:
-        """Return the events since the last call, oldest first, at most 256."""
+        """Return the newest 256 events since the last call, oldest first."""
         with self._changed:
             events = list(self._events)
             self._events.clear()
         return events
 
     def refusal(self, seq: int) -> str:
-        """Return the reason why the robot refused a command, or "" if it has not."""
+        """Return why the robot refused message `seq`; "" if it did not, or refused one since."""
         return self._refusals.get(seq, "")
 
     def _observe(self, message: messages.Observation) -> None:

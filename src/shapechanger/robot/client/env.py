@@ -36,7 +36,7 @@ _QUANTITIES: Final = {"speed": ("speed",), "collision": ("collision", "bump"), "
 
 
 class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
-    """Env of a robot on the network: a car, boat, tank, cat or finger.
+    """Env of a robot on the network, such as a car, a boat or a finger.
 
     ## Action space
     One number for each action of the robot, in the order of `action_layout`: for vehicles
@@ -55,8 +55,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     out.
 
     ## Start
-    `reset` waits until the operator has armed the robot, or runs the reset routine of its profile.
-    The first observation is captured after that.
+    `reset` takes control, waits until the robot is armed (see `on_reset`), and runs the profile's
+    reset routine with `on_reset="routine"`. The first observation is captured after that.
 
     ## End
     Terminated by a collision, unless the reward is set otherwise. Truncated when the link is lost,
@@ -70,8 +70,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     `action_applied`: applied outputs; `stop_reason`: why they differ from the action; `refused`:
     why the robot refused the command of this step; `events`: the robot's events, as sentences;
     `latency`: delays, s, see `latencies`; `frame_age`, s; `frame_repeated`: whether the image is
-    the previous one; `deadline_missed`: number of steps in this episode that
-    ended half a period late or more; `armed`, `emergency`; `absent`: features of the state without
+    the previous one; `deadline_missed`: number of steps in this episode that ended more than half a
+    period late, 0 in lockstep; `armed`, `emergency`; `absent`: features of the state without
     a measurement, which have the middle of their range; `captured_ns` and `decided_ns`: capture
     time of the frame, and arrival time of the applied command, ns of the robot's clock;
     `intervene_action`: command of a person who has control instead of the program.
@@ -80,8 +80,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         robot: Name of a known robot, or its address, HOST or HOST:PORT.
         key: The robot's key, for an address.
         fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
-        size: Width and height of the images, pixels, such as (128, 128) in the original release;
-            see `resize_picture`. None for the camera's size.
+        size: Width and height of the images, pixels, such as (128, 128), as in this project's
+            original release of 2017; see `resize_picture`. None for the camera's size.
         state: Whether observations have the state in addition to the image.
         image: Whether observations have an image; by default, if the robot has a camera.
         pace: "realtime": a step lasts one control period of the robot; "lockstep": the robot waits
@@ -234,7 +234,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         return view.observation, self._info(received, view)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Send a command in answer to the newest observation, and wait for the next one.
+        """Send a command in answer to the last observation, and wait for the next one.
 
         Raises:
             SpaceMismatch: If the action does not fit the robot.
@@ -292,7 +292,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         return self._spaces.picture.copy()
 
     def close(self) -> None:
-        """Stop the robot, and give control back."""
+        """Stop the robot, give control back, and end the connection."""
         if self._client.alive:
             self._client.release()
         self._client.close()

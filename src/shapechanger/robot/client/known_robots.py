@@ -74,7 +74,8 @@ def check_name(name: str) -> None:
     """
     if not _NAME.fullmatch(name):
         raise LinkError(
-            f"A robot's name has up to 64 letters, digits, '-', '_' and '.', got {name!r}."
+            "A robot's name must have 1 to 64 letters, digits, '-', '_' and '.', and begin with a "
+            f"letter or digit, got {name!r}."
         )
 
 
@@ -98,7 +99,7 @@ def remember(robot: KnownRobot) -> Path:
         OutputError: If it cannot be written; an existing file is unchanged.
     """
     path = known_folder() / f"{robot.name}.toml"
-    # JSON strings are TOML strings, except for one character, which no field contains.
+    # JSON strings without DEL (U+007F) are TOML strings; no field contains DEL.
     lines = [
         f"{field} = {json.dumps(getattr(robot, field), ensure_ascii=False)}\n" for field in _FIELDS
     ]
@@ -113,11 +114,11 @@ def recall(name: str) -> KnownRobot:
 
     Raises:
         UnknownName: If there is no robot of this name.
-        LinkError: If its file is invalid, or other users can read it.
+        LinkError: If its file is invalid, or other users can access it.
     """
     path = _file(name)
     if os.name == "posix" and path.stat().st_mode & 0o077:
-        raise LinkError(f"Other users can read the key in {path}: run `chmod 600 {path}`.")
+        raise LinkError(f"Other users can access {path}, which has a key: run `chmod 600 {path}`.")
     with translate_errors(ValueError, to=lambda error: LinkError(f"Cannot read {path}: {error}.")):
         fields = tomllib.loads(read_text(path))
     if set(fields) != set(_FIELDS) or not all(isinstance(v, str) for v in fields.values()):

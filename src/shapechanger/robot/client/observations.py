@@ -46,14 +46,14 @@ class View(NamedTuple):
     """Observation of an env, and fields for its `info`."""
 
     observation: Any  # Shares no memory with other observations.
-    fresh: bool  # Whether its image differs from the previous one; True without images.
+    fresh: bool  # Whether its frame is newer than the previous one; True without images.
     absent: tuple[str, ...]  # Names of the state's features that no sensor measures now.
 
 
 class RobotSpaces:
     """Spaces and layouts of one robot, and observations from its messages.
 
-    An observation is an image, which is one block of its layout, the state, or both.
+    An observation is an image, the state, or both. An image is one block of its layout.
     """
 
     def __init__(

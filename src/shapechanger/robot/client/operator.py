@@ -15,7 +15,7 @@ from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.observations import RobotSpaces
 from shapechanger.robot.link.messages import Observation
 
-_POLL_S: Final = 0.05  # Period of checks for a person's actions.
+_POLL_S: Final = 0.05  # Time between two tries, s.
 _NS_PER_S: Final = 1e9
 
 _log = logging.getLogger(__name__)
@@ -23,7 +23,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(slots=True)
 class Preparation:
-    """Steps of one reset, with one time limit for all of them."""
+    """Steps of one reset; one time limit applies to all their waits."""
 
     timeout_s: float
     on_waiting: Callable[[str], object] | None  # Called with a sentence; None to log it.
@@ -36,7 +36,7 @@ class Preparation:
         return self._since + self.timeout_s - time.monotonic()
 
     def connect(self, make: Callable[[], RobotClient]) -> RobotClient:
-        """Connect, with retries."""
+        """Connect; try again while no robot answers, but not after a refusal."""
         while True:
             try:
                 return make()
@@ -73,7 +73,7 @@ class Preparation:
         while True:
             seen = robot.ask().message
             if not seen.mine and self._left_s >= 0.0:
-                # A person who arms the robot for the program first gives control back.
+                # To arm the robot for the program, a person first gives control back.
                 self.take(robot)
                 continue
             if seen.mine and seen.armed and not seen.emergency:
@@ -134,10 +134,10 @@ class Preparation:
 
 
 class Takeover:
-    """Continues an episode while a person has control.
+    """Continues an episode while a person has control, if that is `allowed`.
 
-    Afterwards the person gives control back and arms the robot for the program. Until both have
-    happened, the program only sends suggestions.
+    Meanwhile the program sends suggestions. Afterwards the person gives control back and arms the
+    robot for the program, whose commands have no effect until both have happened.
     """
 
     def __init__(self, *, allowed: bool) -> None:
@@ -145,7 +145,7 @@ class Takeover:
         self._waits = False
 
     def act(self, robot: RobotClient, values: tuple[float, ...], last: Observation) -> int:
-        """Send a command, or a suggestion while another client has control; return its number."""
+        """Send a command, or a suggestion after a permitted loss of control; return its `seq`."""
         if not self._allowed or last.mine:
             return robot.command(values, answers=last.seq)
         if not last.holder:
@@ -155,9 +155,9 @@ class Takeover:
         return robot.suggest(values, answers=last.seq)
 
     def goes_on(self, seen: Observation) -> bool:
-        """Return True while a person drives or is about to give control back.
+        """Return True from the time when the program lost control until it controls an armed robot.
 
-        The episode then continues, although the program does not control an armed robot.
+        The episode then continues. An emergency stop, or another program in control, ends it.
         """
         if not self._allowed or seen.emergency:
             return False
@@ -167,7 +167,7 @@ class Takeover:
 
     @staticmethod
     def action(seen: Observation) -> tuple[float, ...] | None:
-        """Return the command of a person, or None if no person has control."""
+        """Return the command of a person who has control, or None."""
         return seen.commanded if seen.commanded and seen.holder_role == "person" else None
 
 

@@ -41,7 +41,7 @@ from shapechanger.robot.client.teleop import Terminal
 from shapechanger.robot.link.messages import EpisodeSummary, Piece, Welcome
 
 _STEP: Final = b'{"kind":"step",'
-_CLOSED_WITHIN_S: Final = 10.0  # Time that a memory card may need for the last steps.
+_CLOSED_WITHIN_S: Final = 10.0  # Time that a memory card may need for the last steps, s.
 _LOOK_EVERY_S: Final = 0.1
 
 
@@ -91,7 +91,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
         if edits and (merged := have[:begin] + theirs + own) != have:
             write_atomic(folder / STEPS, b"".join(merged))
         os.fsync(file.fileno())
-        # Keep a header that was closed on this machine only, by a repair.
+        # Keep a closed header: a repair may have closed it on this machine only.
         if not (folder / HEADER).is_file() or read_header(folder)[1] is None:
             write_atomic(folder / HEADER, piece.header.encode())
             read_header(folder)
@@ -119,7 +119,7 @@ def _without(lines: Sequence[bytes], others: Sequence[bytes]) -> list[bytes]:
 
 
 def _complete_lines(folder: Path, file: io.FileIO) -> list[bytes]:
-    """Return the local lines, after removing a truncated last one."""
+    """Return the local lines; remove a truncated last one of an unfinished download."""
     lines = io.BytesIO((folder / STEPS).read_bytes()).readlines()
     if lines and not lines[-1].endswith(b"\n"):
         if (folder / HEADER).is_file():

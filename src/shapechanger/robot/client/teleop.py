@@ -1,4 +1,4 @@
-"""Keyboard teleoperation: the meaning of keys, without sockets or pins."""
+"""Keyboard teleoperation: reading keys from a terminal, and their meaning."""
 
 from __future__ import annotations
 
@@ -185,8 +185,8 @@ class KeyParser:
             now_s: Time at which they were read, s.
 
         Returns:
-            The keys: letters in lower case, "up", "down", "left", "right", "space", "escape",
-            "enter" and `OTHER`.
+            The keys: printable ASCII characters (letters in lower case), "up", "down", "left",
+            "right", "space", "escape", "enter" and `OTHER`.
         """
         keys = self.expire(now_s)
         text = self._decoder.decode(data)

@@ -1,8 +1,8 @@
 """A car without sensors, which all attacks share.
 
-It is a twin in real time, with its real supervisor, guard and daemon. During each attack a person
-has control, with the robot armed and at rest, so that any accepted command would move a pin. After
-the attack the twin's ledger must show no movement, and the robot must serve an honest client.
+It is a twin in real time, with its real supervisor, guard and daemon. In a `scene`, a person has
+control, with the robot armed and at rest, so that any accepted command would move a pin. After the
+attack the twin's ledger must show no movement, and the robot must serve an honest client.
 """
 
 from collections.abc import Iterator

@@ -8,7 +8,7 @@ from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.client.attacks.stranger import Stranger, key_bytes
 
 FULL = (1.0, 1.0)
-"""Actions that every attacker commands."""
+"""Full steering and throttle, which attackers command."""
 
 CAP = 0.6
 """Largest duty of the motor that the profile allows."""

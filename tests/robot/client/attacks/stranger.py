@@ -89,7 +89,7 @@ class Stranger:
     # Bytes.
 
     def write(self, data: bytes) -> None:
-        """Send bytes; a robot that has closed the connection does not read them."""
+        """Send bytes; do nothing if the robot has closed the connection."""
         with contextlib.suppress(BrokenPipeError, ConnectionResetError, ssl.SSLError):
             self._socket.sendall(data)
 
