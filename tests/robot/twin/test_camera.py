@@ -67,8 +67,8 @@ def test_frames_without_a_reader_are_dropped(tmp_path: Path) -> None:
             operator.advance(100.0)  # A full pipe does not stop the clock.
 
 
-def test_in_real_time_the_pipe_holds_the_latest_frame_only(tmp_path: Path) -> None:
-    """After a pause, a reader gets one frame, not a queue of old ones."""
+def test_in_real_time_the_pipe_holds_one_frame_only(tmp_path: Path) -> None:
+    """After a pause, a reader gets one frame, because the frames after it were dropped."""
     with (
         start_board(CAR, "real", tmp_path, CameraPlan("pipe", fps=100.0)) as board,
         _open(board) as pipe,

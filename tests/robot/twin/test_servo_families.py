@@ -71,7 +71,7 @@ def tensed() -> Iterator[_Bench]:
 
 
 def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
-    """Flexors reach their commanded lengths with at most their largest tension.
+    """Flexors are wound in, with at most their largest tension and their gears' friction.
 
     No servo has torque before the first command. At the command 0, each servo pulls with its
     pretension, within one count of its goal.
@@ -92,7 +92,7 @@ def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
 
 
 def test_an_emergency_stop_ends_without_torque(bench: _Bench) -> None:
-    """Tensions fall to the pretension within 0.3 s; then all servos have no torque."""
+    """Tensions fall to the pretension first; 0.4 s after the stop, no servo has torque."""
     bench.drive(_FLEX, 25)
     assert min(bench.pulls()) > 0.0
     bench.robot._orders.waiting.append(Order("emergency", issued_ns=bench.robot.now_ns))

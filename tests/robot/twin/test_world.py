@@ -97,7 +97,7 @@ def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
     seed=st.integers(0, 10_000),
     steps=st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 2), min_size=1, max_size=30),
 )
-def test_no_vehicle_passes_through_walls(seed: int, steps: list[tuple[float, float]]) -> None:
+def test_a_tank_does_not_pass_through_walls(seed: int, steps: list[tuple[float, float]]) -> None:
     world = DrivingWorld({"left track", "right track"}, _SIZE, seed)
     for left, right in steps:
         world.advance(0.2, {"left track": left, "right track": right})

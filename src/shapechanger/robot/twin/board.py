@@ -213,8 +213,8 @@ class Board:
 class TwinTimeBoard(Board):
     """A board whose time advances only while a client sleeps and all participants wait.
 
-    A client is a participant from its first `wait`. A wait ends at the next tick of the guard, or
-    at the client's `until_ns` if that is earlier.
+    A client is a participant from its first `wait`. All waits end together: at the next tick of the
+    guard, at the end of a sleep, or at the earliest `until_ns`.
     """
 
     def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
@@ -231,7 +231,7 @@ class TwinTimeBoard(Board):
         return self._now_ns
 
     def wait(self, caller: BoardConnection, until_ns: int) -> object:
-        """Make a client a participant, and let it wait until the next tick or `until_ns`."""
+        """Make a client a participant, which waits for the next event; see the class."""
         self._wanted_ns[caller] = until_ns
         caller.waits = caller.call_id
         return _LATER
@@ -264,7 +264,7 @@ class TwinTimeBoard(Board):
                 connection.reply(call_id, Slept(self._now_ns, newest_ns))
 
     def _step(self, end_ns: int) -> None:
-        """Advance to the time of the next event."""
+        """Advance to the next image, or to the time at which all waits end, and end them."""
         now_ns = self._now_ns
         while (tick_ns := START_NS + round(self._ticks * 1e9 / self._tick_hz)) <= now_ns:
             self._ticks += 1

@@ -52,7 +52,7 @@ class FrontCameraPipe:
         self._fault = ""
 
     def take(self, now_ns: int) -> None:
-        """Take the image that is due, and skip earlier images that were not taken."""
+        """Take and write the image that is due, if the pipe accepts it; skip earlier images."""
         while self.next_ns <= now_ns:
             self._taken += 1
             self.next_ns = self.start_ns + round(self._taken * 1e9 / self.plan.fps)
@@ -102,7 +102,7 @@ class FrontCameraPipe:
         return True
 
     def _ready(self) -> bool:
-        """Return whether an image can be written now."""
+        """Write the rest of the last image; return whether a new image can be written now."""
         if not self.find_reader():
             return False
         if self._rest:

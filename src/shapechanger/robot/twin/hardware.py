@@ -51,7 +51,7 @@ class SteadyClock(Clock):
 class GrantedClock(SteadyClock):
     """The twin's own clock, which the board advances.
 
-    A process that calls `wait` becomes a participant; time advances only while all of them wait.
+    Time advances only while a client sleeps and each process that has called `wait` is waiting.
     """
 
     def __init__(self, client: rpc.BoardClient, path: str) -> None:
@@ -63,7 +63,7 @@ class GrantedClock(SteadyClock):
         return self._client.now_ns
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Wait until the board advances time to the next tick or `until_ns`; see `Clock.wait`."""
+        """Wait until the board ends all waits, see `TwinTimeBoard`, for at most `at_most_s`."""
         granted = self._client.wait(until_ns, at_most_s)
         self._client.dispatch()
         return granted

@@ -1,4 +1,4 @@
-"""Ledger of the board: all changes of its outputs, and the decision whether one was permitted.
+"""Ledger of the board: all changes of its outputs, and the search for motion without permission.
 
 The board writes each change of a pin, pulse or chip to one line of the ledger, as JSON.
 
@@ -11,11 +11,11 @@ pulse   pin, us, hz, pid         servo pulses; 0 us for none
 i2c     bus, address, register, data, pid      bytes written to a chip
         bus, address, channel, us, hz          the resulting pulses of a PWM channel
 gone    pid                      a process died; the next lines have the levels of its pins
-input   pin, level               an edge of a sensor
+input   pin, level               an edge of a sensor or of the emergency button
 place   seed                     the operator placed the vehicle at a start
 put_back                         the operator put the vehicle back after a collision
 course  seed                     the operator replaced the surroundings
-fault   detail                   the operator broke or pressed something
+fault   detail                   the operator broke, repaired, pressed or released something
 ```
 
 Each line is written at once, so that a crash leaves at most one broken line, the last.
@@ -142,7 +142,7 @@ class TwinWiring:
         return pin in self._high or pin in self._low
 
     def power_ends_ns(self, levels: Levels) -> int | None:
-        """Return the time at which the one-shot cuts the motors' power, ns; None without it."""
+        """Return when the one-shot cuts the power, ns: 0 before any edge; None without one."""
         if self._one_shot_ns is None or self.plan.enable_pin is None:
             return None
         edge_ns = levels.edges_ns.get(self.plan.enable_pin)

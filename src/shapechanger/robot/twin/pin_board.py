@@ -214,7 +214,7 @@ class PinBoard:
         return self.require_rig(device).write(data, at)
 
     def free(self, caller: BoardConnection, died: bool) -> None:
-        """Free the pins of a process that has ended; `died` is true if it has not closed them.
+        """Free the pins of a process that has ended; `died` is true if it did not `leave`.
 
         Outputs keep the level that they have at that moment.
         """

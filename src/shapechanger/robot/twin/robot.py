@@ -63,7 +63,7 @@ class RunningRobot:
 
     @property
     def port(self) -> int:
-        """Port on 127.0.0.1; while the daemon restarts, wait until its new port is known."""
+        """Port on 127.0.0.1, once the daemon can be reached; see `await_restart`."""
         return int(self.await_restart()["port"])
 
     @property
@@ -109,7 +109,7 @@ class RunningRobot:
         return path.read_text(errors="replace") if path.exists() else ""
 
     def await_restart(self) -> dict[str, Any]:
-        """Wait until the daemon can be reached, also after a restart.
+        """Wait until the daemon can be reached; after `forget_ready`, until it has restarted.
 
         Returns:
             The "port" of the daemon, and the "fingerprint" of its certificate.

@@ -29,7 +29,8 @@ Role = Literal["hardware", "operator", "clock"]
 
 _GONE: Final = "The twin's board has ended."
 _HELD_UP_S: Final = 0.01  # Interval of `while_held_up` while the board does not reply, s.
-_PATIENCE_S: Final = 10.0  # Time limit for a reply of the board, s.
+# Time for which `while_held_up` is called in a transfer, s; then the supervisor sees the silence.
+_PATIENCE_S: Final = 10.0
 _MAX_EDGES: Final = 500  # Number of edges to queue for a client that does not wait for them.
 
 _Result = TypeVar("_Result")
@@ -117,7 +118,7 @@ class BoardClient:
         self.levels: dict[int, int] = {}  # Levels of the pins that are claimed as inputs.
         # Functions that `dispatch` calls with the level and the time of an edge, keyed by pin.
         self.watchers: dict[int, Callable[[int, int], None]] = {}
-        # Called every 10 ms while a request cannot be sent, or the board does not reply to it.
+        # Called every 10 ms, for up to 10 s, while a request cannot be sent or gets no reply.
         self.while_held_up: Callable[[], object] = lambda: None
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ExitStack() as undo:
@@ -155,7 +156,7 @@ class BoardClient:
         return self._replies.pop(call_id).decode(kind)
 
     def wait(self, until_ns: int = 0, at_most_s: float = 0.0) -> bool:
-        """Wait until the board reports edges, or advances twin time to the next tick or `until_ns`.
+        """Wait until the board reports edges or, with a twin's clock, ends all waits.
 
         Return True after a report, which updates `now_ns` and `levels`, or False after `at_most_s`.
         """
@@ -247,8 +248,8 @@ class BoardConnection:
     def add_edge(self, edge: Edge) -> None:
         """Queue an edge of the client's inputs, in order of time, until the client waits.
 
-        If more than 500 edges are queued, only the last edge of each input is kept. The kernel also
-        drops edges that are not read.
+        If more than 500 edges are queued, only the last edge of each input is kept. The kernel
+        drops unread edges, too.
         """
         self._edges.append(edge)
         if len(self._edges) > _MAX_EDGES:

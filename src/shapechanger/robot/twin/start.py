@@ -90,7 +90,7 @@ class BoardAt:
         return "shapechanger.robot.twin.hardware:connect", self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
-        """Return a camera plan for a profile that reads the images of this board."""
+        """Return the camera plan of a profile, changed to read the images of this board."""
         if not self.fifo_path.is_fifo():
             raise RobotError("This twin was started without a camera.")
         return replace(plan, driver="pipe", settings={"path": str(self.fifo_path)})

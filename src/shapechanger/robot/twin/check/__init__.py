@@ -1,1 +1,1 @@
-"""Checks that drive a robot, on its twin or on its pins, and faults after which it must stop."""
+"""Checks that drive a robot, watched on its twin or at its pins; faults that must stop it."""

@@ -1,6 +1,6 @@
 """Program that drives at full throttle in a separate process.
 
-It reads the robot's address from standard input, and prints the monotonic time, ns, of each sent
+It reads a `KnownRobot` as JSON from standard input, and prints the monotonic time, ns, of each sent
 command on a line. For faults of policies, a pilot replaces this program: it drives like a policy on
 the robot's computer, and fails at a signal of `FAILURES`.
 """

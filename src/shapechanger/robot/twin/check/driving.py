@@ -17,7 +17,7 @@ from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.robot import RunningRobot
 
-# Tolerance of the time from the last command to rest, in addition to the deadline.
+# Tolerance, ms, of the time from the last command to rest, beyond the deadline and a period.
 _SLACK_MS: Final = 50.0
 _DRIVES_S: Final = 1.0
 _PUSH_S: Final = 0.3

@@ -132,7 +132,7 @@ class Fault:
     needs: Literal["", "camera", "bumper", "button", "one-shot"] = ""  # Required part.
     harms: bool = True  # Whether the fault stops the driving; if not, the driver is killed later.
     silences: bool = False  # Whether the robot must ignore later commands of the driver.
-    guards_late: bool = False  # Whether the guard fails: it may obey commands `within_ms` longer.
+    guards_late: bool = False  # Whether the guard fails: expired commands may act for `within_ms`.
     by_policy: bool = False  # Whether a policy drives, for which a person has armed the robot.
     on_pins: bool = False  # Whether to also try the fault on real pins with LEDs.
 
@@ -222,7 +222,7 @@ def _command_without_the_lease(client: RobotClient) -> None:
 
 
 def _connect_silently(scene: Scene) -> None:
-    """Open connections without authenticating, as many as the robot accepts."""
+    """Open 40 connections without authenticating, more than the robot keeps of an address."""
     for _ in range(40):
         stranger = socket.create_connection(("127.0.0.1", scene.robot.port))
         scene.opened.enter_context(stranger)

@@ -162,7 +162,7 @@ class Bench:
         return _ProbeWatcher(self.probe, self._probed, Hardware())
 
     def close(self) -> list[str]:
-        """End robot and board, put this machine's pins at rest, and return the failures."""
+        """End robot and board, put pins at rest if they were used, and return the failures."""
         was_served = vars(self).pop("robot", None) is not None
         vars(self).pop("board", None)
         self.restarts = 0
@@ -213,7 +213,7 @@ class TrialResult:
     drove: bool  # Whether the robot drove at the time of the fault; otherwise the trial is void.
     # Intervals of propulsion without a valid command; empty on real pins.
     unauthorised: tuple[Interval, ...] = ()
-    answer: bool | None = None  # Whether a person saw the robot drive and stop; None if not asked.
+    answer: bool | None = None  # Whether a person saw the robot drive and stop; None if unknown.
 
     @property
     def kept(self) -> bool:
@@ -225,7 +225,7 @@ def run_trials(bench: Bench, fault: Fault, trials: int) -> Iterator[TrialResult]
     """Drive, cause the fault and evaluate, until the robot has driven in `trials` trials.
 
     At most three times as many trials are made. If a busy machine restarts the robot or delays the
-    fault, the trial is repeated with a new robot.
+    fault, the trial is repeated with a new robot; the tenth such failure in a row is raised.
     """
     drove = tried = not_tried = 0
     while drove < trials and tried < _TRIES * trials:
