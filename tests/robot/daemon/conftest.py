@@ -1,4 +1,4 @@
-"""Fixture `robot`: a daemon for each test. Tests that are coroutines run in its event loop."""
+"""Fixture `robot`: a daemon for each test. Coroutine tests run in its event loop, if any."""
 
 import asyncio
 import inspect

@@ -155,7 +155,7 @@ class Running:
         await client.send(link.Arm(answers=seen.seq, emergency=emergency))
 
     async def armed(self, client: Client) -> None:
-        """Let a person take control and arm."""
+        """Let a client take control and arm, and wait until the daemon knows."""
         await client.obtain()
         await self.arm(client)
         await until(lambda: self.daemon._hub.state.armed, "it is armed, and the daemon knows")

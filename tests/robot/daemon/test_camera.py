@@ -49,7 +49,7 @@ GOOD = picture(3)
         (GOOD[: len(GOOD) // 2], 2, "cannot be decoded"),
         (GOOD[: len(GOOD) // 2] + b"\xff\xd9", 2, "cannot be decoded"),
         (picture(1), 2, "same frame"),
-        (GOOD, 1, "older than the one before"),
+        (GOOD, 1, "not newer than the one before"),
         (GOOD, NOW_NS + 60_000_000, "from the future"),
     ],
 )

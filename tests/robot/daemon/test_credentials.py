@@ -93,7 +93,7 @@ def test_folders_follow_the_xdg_specification(
             folder_of(name)
 
 
-def test_serving_other_machines_needs_a_key() -> None:
+def test_serving_other_machines_needs_a_key_or_insecure() -> None:
     check_exposure(car_plan(host="127.0.0.1"))
     check_exposure(car_plan(host="0.0.0.0", insecure=True))
     check_exposure(car_plan(host="0.0.0.0", credentials="c"))
@@ -101,7 +101,7 @@ def test_serving_other_machines_needs_a_key() -> None:
         check_exposure(car_plan(host="0.0.0.0"))
 
 
-def test_reading_credentials_does_not_import_the_certificate_builder() -> None:
+def test_the_daemon_imports_neither_cryptography_nor_gpiozero() -> None:
     script = (
         "import sys, shapechanger.robot.daemon.process; "
         "assert 'cryptography' not in sys.modules and 'gpiozero' not in sys.modules"

@@ -85,7 +85,7 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
 
 
 def test_a_person_can_always_connect() -> None:
-    """At the limits of 6 programs and 8 clients, the oldest client without control is removed."""
+    """At a limit, a program is refused; a person removes the oldest client without control."""
     hub, programs = new_hub(), [Client(number) for number in range(6)]
     people = [Client(10 + number, f"person {number}", "person") for number in range(3)]
     for client in programs:

@@ -17,7 +17,7 @@ from tests.robot.daemon.running import Running, until
 
 pytestmark = pytest.mark.plan(policies=".")
 
-# Fake process of a policy: prints its task, and behaves as the policy's name says.
+# Fake process of a policy: prints its robot, and behaves as the policy's name says.
 _PROCESS = """
 import json, sys, time
 task = json.loads(sys.stdin.readline())
@@ -94,7 +94,7 @@ async def test_a_policy_starts_with_the_robot_and_another_takes_its_place(
     [
         ("bad", "bad ended: It gave NaN."),
         ("crash", "crash ended: its process ended with code 7."),
-        ("babble", "babble ended: its process wrote a line of more than 1024 characters."),
+        ("babble", "babble ended: its process wrote a line of more than 1024 bytes."),
     ],
 )
 async def test_a_policy_that_ends_is_reported(
@@ -112,7 +112,7 @@ async def test_a_deaf_policy_is_killed(
 ) -> None:
     monkeypatch.setattr(policies, "_END_S", 0.05)
     one.run("deaf")
-    await until(lambda: said and said[-1].text == "deaf drives", "it hears nothing")
+    await until(lambda: said and said[-1].text == "deaf drives", "it drives")
     one.run("")
     await until(lambda: said[-1].running == "", "it is gone")
 

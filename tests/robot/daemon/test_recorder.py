@@ -164,7 +164,7 @@ def test_the_later_of_two_decisions_counts() -> None:
         st.tuples(st.booleans(), st.sampled_from((ADA, NET)), st.integers(0, 4)), max_size=60
     )
 )
-def test_times_increase_and_no_frame_repeats(events: list[tuple[bool, Client, int]]) -> None:
+def test_times_never_decrease_and_no_frame_repeats(events: list[tuple[bool, Client, int]]) -> None:
     built = Built()
     sent: dict[Client, list[Sent]] = {ADA: [], NET: []}
     pictures_seen = [frame(number) for number in range(22)]

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.realtime
 async def test_a_wrong_key_is_refused_after_a_pause(
     robot: Running, key: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A client with the right key can connect meanwhile."""
+    """A client with the right key can connect from the same address."""
     monkeypatch.setattr(session, "_WRONG_KEY_S", 0.05)
     loop = asyncio.get_running_loop()
     for _ in range(3):
@@ -83,7 +83,7 @@ async def test_connections_are_limited_before_authentication(robot: Running) -> 
 
 
 @pytest.mark.parametrize("how", ["release", "close", "abort"])
-async def test_a_disconnection_disarms_the_robot(robot: Running, how: str) -> None:
+async def test_a_release_or_a_disconnection_disarms_the_robot(robot: Running, how: str) -> None:
     async with robot.client(role="person", name="Ann") as client:
         await robot.armed(client)
         if how == "release":
@@ -143,7 +143,7 @@ async def test_a_client_that_does_not_read_is_dropped(
 
 
 @pytest.mark.plan(robot="<b>car")
-async def test_the_console_reveals_only_the_robots_name(robot: Running) -> None:
+async def test_pages_have_safe_headers_and_not_the_robots_name(robot: Running) -> None:
     async with robot.session.get(robot.url) as page:
         assert page.content_type == "text/html"
         assert "<b>car" not in await page.text()

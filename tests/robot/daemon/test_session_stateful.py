@@ -118,7 +118,7 @@ class Robot(stateful.RuleBasedStateMachine):
         client=clients, by_holder=st.booleans(), emergency=st.integers(0, 2), back=_backs
     )
     def arm(self, client: Connected, by_holder: bool, emergency: int, back: int) -> None:
-        """A client that sees the robot can arm it if a client has control.
+        """A client that answers a fresh observation can arm the robot if a client has control.
 
         It must be a person, or, if anyone may arm, a program in control without an emergency.
         """

@@ -44,7 +44,7 @@ class FrameChecks:
             return "The camera repeats the same frame."
         self._last = frame.jpeg
         if frame.captured_ns <= self._newest_ns:
-            return "The camera sent a frame that is older than the one before."
+            return "The camera sent a frame that is not newer than the one before."
         if self._now_ns is not None and frame.captured_ns > self._now_ns() + _FUTURE_NS:
             return "The camera sent a frame from the future."
         self._newest_ns = frame.captured_ns

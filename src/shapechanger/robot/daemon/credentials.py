@@ -73,7 +73,7 @@ def credentials_folder(name: str) -> Path:
 
 
 def user_folder(variable: str, default: str) -> Path:
-    """Return a folder of the XDG base directory specification, which excludes relative paths."""
+    """Return Shapechanger's folder in an XDG base directory; a relative `variable` is ignored."""
     path = os.environ.get(variable, "")
     return (Path(path) if path.startswith("/") else Path.home() / default) / "shapechanger"
 
@@ -116,7 +116,7 @@ def load_credentials(folder: Path) -> Credentials:
             mode = file.stat().st_mode
         if mode & _OTHERS:
             raise RobotError(
-                f"Other users can read {file}. Run `chmod 600 {file}`, or better, make a new key."
+                f"Other users can access {file}. Run `chmod 600 {file}`, or better, make a new key."
             )
     with _readable(folder / _KEY):
         key = (folder / _KEY).read_text().strip()
@@ -127,7 +127,7 @@ def load_credentials(folder: Path) -> Credentials:
 
 
 def check_exposure(plan: DaemonPlan) -> None:
-    """Refuse to serve other machines without TLS and a key."""
+    """Refuse to serve other machines without credentials, unless `insecure` is set."""
     if not (plan.credentials or plan.insecure or is_loopback(plan.host)):
         raise RobotError(
             f"Other machines reach {plan.host}, and could drive the robot without a key. Run "

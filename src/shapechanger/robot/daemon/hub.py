@@ -175,7 +175,7 @@ class SessionHub:
 
     def halt(self) -> None:
         """Drop the newest command, because the lease holder sent an invalid one after it."""
-        # After `give_order`, `settle` would add a step of time to the step of the next observation.
+        # Not by `give_order`, because `settle` would then let one more tick of time pass.
         self._command = _NOTHING
         self._order(Order(kind="halt", issued_ns=self.now_ns()))
 

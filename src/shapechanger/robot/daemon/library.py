@@ -86,7 +86,7 @@ class RecordingLibrary:
         return summary
 
     def _newest(self, before: str) -> messages.Recordings:
-        """List the newest episodes with ids before `before`, or all for ""; newest first."""
+        """List up to `MAX_EPISODES` episodes, newest first; ids before `before`, or any for ""."""
         paths = list(self._folder.iterdir()) if self._folder.exists() else []
         found = sorted((path.name for path in paths if _is_listed(path)), reverse=True)
         self._known = {name: self._known[name] for name in found if name in self._known}

@@ -23,7 +23,7 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     credentials: str = ""  # Folder of the robot's key and certificate; "" for none, and no TLS.
     insecure: bool = False  # Whether to serve without TLS, also to other machines.
     discovery: bool = True  # Whether to announce the robot on the local network.
-    ready_file: str = ""  # File that the port is written to; "" for none.
+    ready_file: str = ""  # File for the port and the fingerprint, as JSON; "" for none.
     recordings: str = ""  # Folder of the recorded episodes; "" for none.
     policies: str = ""  # Folder of the policies that may run on the robot's computer; "" for none.
     policy: str = ""  # Name of the policy that starts with the robot; "" for none.

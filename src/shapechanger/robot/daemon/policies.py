@@ -33,7 +33,7 @@ ENDING: Final = ".onnx"
 
 _END_S: Final = 2.0  # Time for a policy to release the robot and exit.
 _MOST_NAMES: Final = 256
-_LONGEST: Final = 1024  # Longest line that a policy's process may write, characters.
+_LONGEST: Final = 1024  # Longest line that a policy's process may write, bytes.
 
 
 class _Said(msgspec.Struct):
@@ -44,7 +44,7 @@ class _Said(msgspec.Struct):
 
 
 def policies_in(folder: Path) -> list[str]:
-    """Return the names of the policies in a folder, sorted; empty if it cannot be read."""
+    """Return the first 256 names of policies in a folder, sorted; empty if it cannot be read."""
     files: list[str] = []
     with contextlib.suppress(OSError):
         files = sorted(path.name for path in folder.iterdir() if path.suffix == ENDING)
@@ -145,7 +145,7 @@ class PolicyRunner:
         except ConnectionError:
             pass  # The process has ended; its exit code is reported.
         except ValueError:
-            failure = failure or f"its process wrote a line of more than {_LONGEST} characters."
+            failure = failure or f"its process wrote a line of more than {_LONGEST} bytes."
         return failure
 
     def _report(self, running: str, text: str) -> None:

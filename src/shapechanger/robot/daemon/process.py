@@ -53,8 +53,8 @@ _READY_S: Final = 1.0
 class GuardLink:
     """Sends orders to the guard and receives its states, on a non-blocking socket.
 
-    A guard that does not read fills the socket. A command is then dropped, because it would be
-    too old when the guard reads again, and a stop waits until there is room.
+    A guard that does not read fills the socket. A command, or an order to arm, is then dropped,
+    because it would be too old when the guard reads again, and a stop waits until there is room.
     """
 
     def __init__(

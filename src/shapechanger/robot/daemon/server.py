@@ -38,8 +38,8 @@ class Listener:
     """Accepts connections, and limits the number and time of unauthenticated ones.
 
     A connection is registered before its TLS handshake. A new connection is never refused, because
-    it may come from the person who wants to stop the robot. At the limit, it replaces the oldest
-    connection from the address with the most connections.
+    it may come from the person who wants to stop the robot. At the limit per address it replaces
+    the oldest one from its address; at the total limit, from the address with the most of them.
     """
 
     def __init__(
@@ -163,7 +163,7 @@ class AcceptedSocket:
 
     @property
     def is_gone(self) -> bool:
-        """True once the connection has closed by itself."""
+        """True once the socket is closed."""
         return self._socket.fileno() < 0
 
     def drop(self) -> None:

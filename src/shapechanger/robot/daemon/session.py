@@ -95,7 +95,7 @@ class Session:
             autoping=False,  # Pings count as messages here, so that they cannot flood the robot.
             heartbeat=_HEARTBEAT_S,
             compress=False,
-            # Slightly above the limit, so that an oversized message gets an error message.
+            # Above the limit, so that an oversized message gets an error message.
             max_msg_size=4 * messages.MAX_CLIENT_MESSAGE,
             writer_limit=0,
         )
@@ -243,7 +243,7 @@ class Session:
                 f"A command of this robot has {hub.action_size} values, got {len(message.values)}."
             )
         elif not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in message.values):
-            fault = f"The values of a command must be finite and at most {_LARGEST_VALUE:g}."
+            fault = f"The values of a command must be finite and within ±{_LARGEST_VALUE:g}."
         if fault:
             # An invalid command supersedes the previous command. A late or repeated command does
             # not, and must not stop a newer command.
@@ -390,7 +390,7 @@ class Session:
             await self._send(self.observe())
 
     async def _wait_until_due(self) -> None:
-        """Wait until one period after the last observation was due, or for its frame."""
+        """Wait until the next observation is due, or for a new frame if frames set the pace."""
         loop, hub = asyncio.get_running_loop(), self._hub
         waits_for_frame = self._by_frames and self._wants_frames
         while not (waits_for_frame and hub.frame_seq != self._frame_seq) and (
