@@ -1,7 +1,7 @@
 """Hardware below the drivers: pins, buses and clocks, real or of a twin.
 
 The processes of a robot get the source of their hardware as MODULE:NAME and one argument, so the
-same drivers run on a Raspberry Pi and on a twin, and no code of the robot depends on a twin.
+same drivers run on a Raspberry Pi and on a twin; drivers, guard and daemon import no twin.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ REAL: Final = "shapechanger.robot.hardware:Hardware"
 
 
 class Clock:
-    """The machine's monotonic clock; a twin overrides all methods.
+    """The machine's monotonic clock; the clocks of twins override some or all methods.
 
     Attributes:
         is_real: Whether the hardware needs time to respond; a twin's chips respond at once.

@@ -38,8 +38,8 @@ from shapechanger.robot.twin.start import BoardAt, Place, find_board, start_boar
 _HERE: Final = "127.0.0.1"
 _EVERYWHERE: Final = "0.0.0.0"
 _PILOT: Final = "shapechanger.vehicles.remote.pilot"
-# Longest silence of the guard with `--clock twin`, ms. This clock is paused while the twin renders,
-# and a guard that waits for it is silent without having failed.
+# With `--clock twin`, guard and daemon are killed only after this silence, ms. The clock is paused
+# while the twin renders, and a guard that waits for it is silent without having failed.
 _TWIN_PATIENCE_MS: Final = 10_000
 
 

@@ -23,7 +23,7 @@ PHONE_ON_ITS_SIDE: Final[dict[str, Any]] = PHONE | {"viewport": {"width": 844, "
 _DRIVE: Final = (22, 27)
 
 _DEADLINE_MS: Final = 250.0
-# Tolerance of a stop, ms: a tick of the guard, and the time of the enable line's one-shot.
+# Tolerance of a stop after the deadline, ms: ticks of the guard, and delays of a busy machine.
 _SLACK_MS: Final = 60.0
 _PRESSES: Final = 6
 _PRESSED_S: Final = 10.0

@@ -85,7 +85,7 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
 
 
 def test_a_person_can_always_connect() -> None:
-    """At a limit, a program is refused; a person removes the oldest client without control."""
+    """Programs are limited to 6; at 8 clients, a person removes the oldest without control."""
     hub, programs = new_hub(), [Client(number) for number in range(6)]
     people = [Client(10 + number, f"person {number}", "person") for number in range(3)]
     for client in programs:

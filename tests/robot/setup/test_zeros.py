@@ -19,7 +19,7 @@ _ZEROS = [1234, 4095, 0, 2]
 
 
 class _Straight(DrivingWorld):
-    """Joints held straight by hand, with a tremor; springs replace the finger."""
+    """Joints held straight by hand, with a tremor; the servos pull springs, not a finger."""
 
     def __init__(self, tremble: float = 0.0) -> None:
         super().__init__({"tendon"}, (160, 120), seed=0)

@@ -258,7 +258,7 @@ class Inbox:
         return found
 
     def events(self) -> list[messages.Event]:
-        """Return the newest 256 events since the last call, oldest first."""
+        """Return the events since the last call, oldest first; of more than 256, the newest."""
         with self._changed:
             events = list(self._events)
             self._events.clear()

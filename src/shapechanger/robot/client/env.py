@@ -63,8 +63,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     at an emergency stop, when the robot is disarmed and when another client takes control;
     `info["truncated_because"]` is the reason. After a lost link the observation is the last one,
     and the next `reset` connects again. With `interventions=True` a person may take control within
-    an episode. The program's actions are then only suggestions, until the person gives control
-    back and arms the robot.
+    an episode. The program's actions then have no effect, and are shown as suggestions, until the
+    person gives control back and arms the robot.
 
     ## Info
     `action_applied`: applied outputs; `stop_reason`: why they differ from the action; `refused`:

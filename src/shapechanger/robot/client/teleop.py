@@ -253,8 +253,8 @@ class KeyParser:
 def _as_typed(keys: list[str]) -> list[str]:
     """Return the keys of one read that a person can have meant.
 
-    A stop cancels all other keys. Three different keys at once are pasted text, which not all
-    terminals mark, or old keys from a link that was interrupted.
+    A stop cancels all other keys. Three or more different keys at once are pasted text, which not
+    all terminals mark, or old keys from a link that was interrupted.
     """
     stops = [key for key in keys if key in STOPS]
     if stops:

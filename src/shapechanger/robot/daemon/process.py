@@ -38,7 +38,7 @@ from shapechanger.robot.link.authentication import fingerprint_short, parse_key
 
 _log = logging.getLogger("shapechanger.robot.daemon")
 
-_HEARTBEAT_S: Final = 0.05  # The supervisor expects a heartbeat every 100 ms.
+_HEARTBEAT_S: Final = 0.05  # The supervisor kills a daemon that sends none for 2 s.
 _BEATS_A_REPORT: Final = 20  # The recorder reports once a second.
 
 LIFELINE: Final = b"life"

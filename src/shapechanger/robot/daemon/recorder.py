@@ -127,7 +127,7 @@ class _Episode:
 
 
 class Recorder:
-    """Records one episode at a time, with any client in control. It never waits for the disk.
+    """Records one episode at a time, with any client in control. Only `close` waits for the disk.
 
     While the robot is armed, each observation that is answered by a command becomes a step. The
     next observation of the same client completes it, because it reports the applied outputs. If two

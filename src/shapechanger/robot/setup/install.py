@@ -28,7 +28,7 @@ from shapechanger.robot.profile.profile import Profile
 
 _FAST_HZ: Final = 400_000  # Speed of the I2C bus that encoders at joints need, bits per second.
 _ARM_BUS: Final = 1  # The I2C bus of the header's pins 3 and 5.
-_UARTS: Final = ("serial", "ttyAMA", "ttyS")  # Serial ports of the header.
+_UARTS: Final = ("serial", "ttyAMA", "ttyS")  # Names of the header's serial ports begin so.
 _UNITS: Final = "etc/systemd/system"
 _WANTED: Final = f"{_UNITS}/multi-user.target.wants"
 _UDEV: Final = "etc/udev/rules.d/99-shapechanger-latency.rules"

@@ -8,7 +8,7 @@ Lines have a time `t` in nanoseconds and a kind:
 pin     pin, duty, hz, pid       an output: its level (hz 0), or the duty of its software PWM
         released: true           the pin is no longer driven: its resistors set its level
 pulse   pin, us, hz, pid         servo pulses; 0 us for none
-i2c     bus, address, register, data, pid      bytes written to a chip
+i2c     bus, address, register, data, pid      bytes written to a chip, except for encoders
         bus, address, channel, us, hz          the resulting pulses of a PWM channel
 gone    pid                      a process died; the next lines have the levels of its pins
 input   pin, level               an edge of a sensor or of the emergency button
