@@ -38,7 +38,7 @@ def test_an_extra_that_is_not_installed_is_named_with_its_command() -> None:
     results = findings({"core-package": "2.5"})
     assert results["core"].level == "good"
     assert results["extra learn"].level == "unknown"
-    assert "Without learner" in results["extra learn"].sentence
+    assert "Not installed: learner" in results["extra learn"].sentence
     assert "pip install --upgrade 'shapechanger[learn]'" in results["extra learn"].sentence
     assert results["extra robot"].level == "good"
     assert "extra all" not in results

@@ -1,4 +1,4 @@
-"""The command `shapechanger`: envs, training, playing and transfer studies."""
+"""The command line, `shapechanger`: its entry point and its subcommands."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def say(text: str, *, stderr: bool = False) -> None:
 
 
 def print_table(table: Table) -> None:
-    """Print a table, as wide as the terminal, or as its content in a file."""
+    """Print a table; outside a terminal, as wide as its content, up to `_WIDEST` columns."""
     console = plain_console()
     if not console.is_terminal:
         widest = console.options.update(width=_WIDEST)
@@ -55,7 +55,7 @@ _LINE_EVERY_S: Final = 10.0
 
 
 class StudyProgress:
-    """Shows the progress of several runs, whose `steps` are given, on standard error by default."""
+    """Shows the progress of runs, by default on standard error; `steps` is the length of each."""
 
     def __init__(self, steps: dict[str, int], console: Console | None = None) -> None:
         self._steps = steps

@@ -25,7 +25,7 @@ _PACKAGE: Final = "shapechanger"
 # Extras that combine others, or are for developers of Shapechanger.
 _NOT_LISTED: Final = ("all", "dev")
 _PATIENCE_S: Final = 120  # Time limit of a check, s; rendering the first image is slow.
-# Runs in a separate process, because a broken OpenGL driver ends its process.
+# Runs in a separate process, which a broken OpenGL driver may end.
 _DRAW: Final = """
 from shapechanger.envs.opengl import choose_gl
 choose_gl()
@@ -72,7 +72,7 @@ def examine_machine(
     checks = [
         *(("machine", _machine()), ("core", _extra(parsed, "", installed))),
         *((f"extra {extra}", _extra(parsed, extra, installed)) for extra in extras),
-        # The check of its extra reports a package that is not installed.
+        # If one of these packages is not installed, the check of its extra reports it.
         *([("images", _drawing())] if installed("mujoco") else []),
         *([("torch", _torch())] if installed("torch") else []),
         *([("warp", _warp())] if installed("warp-lang") else []),
@@ -108,7 +108,7 @@ def _extra(parsed: Sequence[Requirement], extra: str, installed: Callable[[str],
     if wrong:
         yield "bad", f"{'; '.join(wrong)}: {remedy}."
     elif absent:
-        yield "unknown", f"Without {', '.join(absent)}; {remedy} to use it."
+        yield "unknown", f"Not installed: {', '.join(absent)}; {remedy} if you need this."
     else:
         yield "good", "Installed."
 

@@ -109,7 +109,7 @@ class TwoEnvs:
     def refs(self, *, studied: bool = False, lenses: Sequence[str] = ()) -> tuple[EnvRef, EnvRef]:
         """Return source and target with their bodies and options.
 
-        In a study, vehicles are reset after a collision, and `lenses` disturb the target's camera.
+        In a study, vehicles are put back after a collision, and `lenses` disturb target cameras.
         """
         source = env_ref(self.source, self.source_body)
         target = env_ref(self.target, self.target_body)

@@ -44,7 +44,7 @@ class Envs:
     height: int = 480
     """Height of the image in pixels."""
     odrl: bool = False
-    """List each env of ODRL in a separate row."""
+    """List the envs of ODRL instead, each in its own row."""
 
     def run(self) -> None:
         if not self.env:

@@ -101,8 +101,8 @@ class FingerRecord:
     actions: str = "impedance"
     """Meaning of an action: impedance, tension or length."""
     gap: str = ""
-    """Name of the gap that the finger is drawn from, such as real-like; empty for the nominal
-    finger."""
+    """Name of the gap (ranges of parameters) that the finger is drawn from, such as real-like;
+    the nominal finger if not given."""
     finger_seed: int = 0
     """Seed of the finger drawn from the gap."""
     options: str = ""
@@ -137,7 +137,7 @@ class FingerExport:
     actions: str = "impedance"
     """Meaning of a control: impedance, tension or length."""
     gap: str = ""
-    """Name of a gap to draw the finger from, such as real-like; excludes --parameters."""
+    """Name of a gap (ranges of parameters) to draw the finger from, instead of --parameters."""
     finger_seed: int = 0
     """Seed of the finger drawn from the gap."""
 

@@ -122,7 +122,7 @@ def _linked(episodes: list[Episode], folder: Path) -> dict[str, str]:
     for episode in episodes:
         name = f"{hub.EPISODES}/{episode.path.resolve().name}"
         frames = {f"{FRAMES}/{step.frame}" for step in episode.steps if step.frame}
-        for file in (HEADER, STEPS, *frames):  # Without `lost/`.
+        for file in (HEADER, STEPS, *frames):  # `lost/` is not uploaded.
             link = folder / name / file
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to((episode.path / file).resolve())

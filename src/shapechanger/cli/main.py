@@ -1,4 +1,4 @@
-"""Entry point of the command line; turns every user error into one sentence."""
+"""Entry point of the command line; prints an error of the user without a traceback."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ COMMANDS: Final = Group(
         "transfer": "transfer:Transfer",
         "suite": _group(
             "suite",
-            "Run, watch and merge suites: many studies with one page.",
+            "Run, watch, merge and list suites: many studies with one page.",
             {"suite": ("run", "watch", "merge", "list")},
         ),
         "policies": _group(
@@ -114,8 +114,8 @@ COMMANDS: Final = Group(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line.
 
-    Exits with 0 on success, with 2 and one sentence on standard error for wrong usage or a missing
-    requirement, and with 130 after Ctrl-C.
+    Returns on success. Exits with 2 and a message on standard error for wrong usage or a missing
+    requirement, with 130 after Ctrl-C, and with 1 if the reader of the output has closed the pipe.
     """
     for stream in (sys.stdout, sys.stderr):
         # Characters that the encoding lacks become question marks.
@@ -140,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # Other errors, and errors with a file name, should have been translated: show a traceback.
         if error.errno not in {errno.ENOSPC, errno.EPIPE} or error.filename is not None:
             raise
-        # Python flushes stdout again at exit.
+        # Python flushes stdout again at exit, which must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if error.errno == errno.EPIPE:  # The reader closed the pipe.
             sys.exit(1)

@@ -103,7 +103,7 @@ class Play(Watching):
     policy: Path | None = None
     """A policy that `train`, a study or `policies export` has written, or `reference` for the one
     that ships for the env; random actions if not given. A policy for another body acts through the
-    body map that matches names."""
+    body map that matches names; a clone of demonstrations is refused if the actions differ."""
     body: Body = ""
 
     def run(self) -> None:
@@ -193,7 +193,7 @@ def _env_of(file: Path, learner: str, env_id: str, body: str) -> EnvRef:
             f"{file} was trained on recordings that name no env: `shapechanger play ENV --policy "
             f"{file}` shows it in one, and other commands have --env."
         )
-    # A policy for many bodies is shown in the family's default body.
+    # A policy for many bodies acts in the family's default body.
     trained_in = env.without("bodies")
     # The env, or its task, may come from a module of the user.
     allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
@@ -204,12 +204,12 @@ def _env_of(file: Path, learner: str, env_id: str, body: str) -> EnvRef:
 
 @dataclass(frozen=True)
 class PoliciesShow:
-    """Show the origin and the layouts of a policy, or list the policies in a folder."""
+    """Show a policy's origin, layouts and settings, or list a folder's policies (.safetensors)."""
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")] = Path("results")
     """A policy, a clone, or a folder, which is searched with its subfolders."""
     references: bool = False
-    """List the shipped policies instead, one for each env."""
+    """List the shipped policies instead; not every env has one."""
     learner: OwnLearner = ""
 
     def run(self) -> None:
@@ -349,7 +349,7 @@ class PoliciesExport(_InEnv):
 
 
 def _learned_with(card: PolicyCard, net: CloneNetwork) -> tuple[str, float | None]:
-    """Return the body and the rate of a clone's demonstrations, as far as its card has them."""
+    """Return body and steps per second of a clone's demonstrations; "" or None if unknown."""
     if card.env is None:
         return net.body, net.control_hz
     # Waypoints have the same meaning in all bodies.

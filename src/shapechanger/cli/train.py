@@ -40,14 +40,14 @@ class Train:
     out: Path | None = None
     """The file to write; results/policies/ENV.safetensors if not given."""
     steps: int | None = None
-    """Number of env steps; the learner's default if not given."""
+    """Number of env steps; the default of the learner, or of the student, if not given."""
     learner: Learner = ""
     set: Settings = ()
     seed: int = 0
     """Seed of all randomness."""
     teacher: Path | None = None
-    """Policy of the same vehicle that observes distances, such as one of CarRanges. A student that
-    observes images only is trained to imitate it, instead of reinforcement learning."""
+    """Policy of the same vehicle that observes distances, such as one trained in CarRanges. Instead
+    of reinforcement learning, a student that observes only images is trained to imitate it."""
     tensorboard: Path | None = None
     """Folder for TensorBoard's logs; none are written if not given."""
 

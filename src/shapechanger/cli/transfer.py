@@ -87,7 +87,7 @@ class Transfer(TwoEnvs, StudyRuns):
     """
 
     quick: bool = False
-    """Use two seeds and an eighth of the steps, to check that everything works."""
+    """Check that all works, with two seeds and an eighth of the steps unless they are given."""
     out: Path | None = None
     """The study's folder; results/SOURCE-to-TARGET if not given."""
     source_policy: Path | None = None

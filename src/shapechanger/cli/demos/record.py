@@ -38,7 +38,7 @@ class DemosRecord(OneEnv):
     """"expert" to let the expert take over when the policy would fail. Training then uses the
     expert's steps only."""
     episode_s: float = 50.0
-    """Longest episode, s; a collision ends it earlier."""
+    """Longest episode, s; the env may end it earlier, for example when a vehicle collides."""
     lenses: tuple[str, ...] = ()
     """Disturbances of a vehicle's camera, such as night."""
     put_back: bool = False

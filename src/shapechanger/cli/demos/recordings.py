@@ -124,8 +124,8 @@ class DemosEdit:
     """Drop, restore or mark steps of an episode; nothing is deleted."""
 
     change: Annotated[Change, tyro.conf.Positional]
-    """cut keeps the range of steps and drops the rest; bad drops the range, good restores it; mark
-    marks the step of --from."""
+    """cut drops the steps outside the range; bad drops the range, good restores it; mark marks the
+    step of --from."""
     episode: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EPISODE")]
     """Folder of the episode."""
     first: Annotated[int | None, tyro.conf.arg(name="from", metavar="STEP")] = None
@@ -185,8 +185,8 @@ class DemosMerge:
         layouts = {(header.action_layout, header.state_layout) for header in headers}
         if len(layouts) > 1:
             say(
-                f"the episodes have {len(layouts)} different layouts; a policy learns from one: "
-                "`shapechanger demos show` lists their robots"
+                f"the episodes have {len(layouts)} different layouts, and a policy can learn from "
+                "only one: `shapechanger demos show` lists their robots"
             )
 
 
@@ -229,7 +229,8 @@ class DemosImport:
     camera: str = ""
     """Camera to import from a LeRobot dataset or a tub with several cameras, such as front."""
     hz: float | None = None
-    """Steps per second, if the format does not state them; computed from its times by default."""
+    """Steps per second, if the source does not state them; by default measured from its times, or
+    20 if it has none."""
     strict: bool = False
     """Refuse a source that is incomplete or contradicts itself, instead of importing the rest."""
 

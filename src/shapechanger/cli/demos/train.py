@@ -62,7 +62,7 @@ class DemosTrain(_Waypoints):
     out: Path
     """The file to write, such as policy.safetensors; policy.html and policy.json go next to it."""
     head: Literal["auto", "class", "regression"] = "auto"
-    """Output: one of the demonstrated actions (at most 16), or numbers."""
+    """Output: one of the demonstrated actions (up to 16), or numbers; auto chooses by the data."""
     inputs: Literal["auto", "picture", "state", "both"] = "auto"
     """Input; by default frames if there are any, else the state."""
     split: Literal["time", "episode"] = "time"

@@ -1,4 +1,4 @@
-"""`shapechanger robot calibrate`: jog each output and write the calibration to the profile."""
+"""`shapechanger robot calibrate`: jog servos and motors, and write the results to the profile."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ _CYCLE_S: Final = 0.01  # Between two readings of a rig.
 # Change of a value at each key press, and in the search for the duty at which a motor starts.
 _STEP: Final = 0.02
 _START_STEP: Final = 0.05
-# Largest difference between a requested and an applied value, and time to wait for it.
+# Largest difference between a requested and an applied value, and time limit to reach it, s.
 _THERE: Final = 0.07
 _SETTLES_S: Final = 4.0
 _STOP_LOOKS: Final = 50  # Most observations to wait for until the robot reports that it stopped.
@@ -122,7 +122,7 @@ class _Ended(Exception):
 
 @dataclass
 class Calibration:
-    """Calibration of all outputs and encoders of a robot, with the results in `found`."""
+    """Calibration of a robot's servos, motors and encoders, with the results in `found`."""
 
     profile: Profile
     keys: Terminal
@@ -134,7 +134,7 @@ class Calibration:
         """Calibrate everything; `found` is empty if the person quits."""
         say(
             "Lift the robot so that nothing can drive away. Enter accepts, N skips this output, "
-            "Q ends without writing, Space and Escape stop everything and end."
+            "Q ends without writing, and Space and Escape stop everything and end without writing."
         )
         try:
             for output in self.profile.outputs:

@@ -31,14 +31,14 @@ from shapechanger.vehicles.cameras.rectify import (
 # Range of the vertical field of view that a profile accepts.
 _LEAST_FOVY_DEG: Final = 10.0
 _MOST_FOVY_DEG: Final = 170.0
-_MOST_BYTES: Final = 2**25
+_MOST_BYTES: Final = 2**25  # Largest image file.
 
 
 @dataclass(frozen=True)
 class RobotCamera:
     """Measure pitch and field of view of the camera, write them into the profile, and draw them.
 
-    With neither --board nor --horizon, the values of the profile are drawn.
+    Without --board, --horizon and --fovy, the values of the profile are drawn.
     """
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
@@ -46,7 +46,7 @@ class RobotCamera:
     picture: Path | None = None
     """JPEG file of the whole field of view; if not given, the robot's camera takes an image."""
     board: str = ""
-    """Inner corners along both sides of an upright checkerboard before the robot, such as 9x6."""
+    """Inner corners along both sides of an upright checkerboard in view, such as 9x6."""
     horizon: float | None = None
     """Row of the horizon in the image, pixels from the top, for example of a distant mark at the
     height of the lens."""

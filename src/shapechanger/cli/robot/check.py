@@ -45,13 +45,13 @@ class RobotCheck:
     """Check a Raspberry Pi with LEDs instead of motors: light each LED, cause faults, and write a
     report."""
     faults: bool = False
-    """Inject every fault into the robot's twin, and judge by the ledger of its pins."""
+    """Inject every fault into the robot's twin, and judge from the recorded levels of its pins."""
     twin: bool = False
     """Check the robot's twin, without any hardware; --faults always uses the twin."""
     port: int = _PORT
     """Port at which the robot will be served."""
     credentials: Path | None = None
-    """Folder of the robot's key and certificate; by default the one that `init` made."""
+    """Folder of the robot's key and certificate; by default the one that `robot init` made."""
     motors_off: bool = False
     """Confirm that the motors' supply is off, to also test the resistors that keep their drivers
     off."""
@@ -71,7 +71,7 @@ class RobotCheck:
     one_shot: bool = True
     """With --faults: simulate the one-shot of the enable line, if the profile has one."""
     report: Path | None = None
-    """File of the report; leds-report.txt with --leds, and none otherwise."""
+    """File of the report; by default leds-report.txt with --leds, and no file otherwise."""
 
     def run(self) -> None:
         profile = load_profile(find_profile(self.profile))
@@ -164,7 +164,7 @@ class RobotCheck:
 
 
 def ask_person(question: str) -> bool | None:
-    """Ask until the answer is yes or no; see `Ask`."""
+    """Ask until the answer is yes or no; return None if the input has ended."""
     with suppress(EOFError):
         return Confirm.ask(question, console=plain_console())
     return None

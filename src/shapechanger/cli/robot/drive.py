@@ -42,7 +42,7 @@ class RobotDrive:
     terminal: bool = False
     """Drive with the keys of this terminal, even where a browser could show the console."""
     policy: Path | None = None
-    """A policy that drives when you permit it, such as one of `shapechanger demos train`."""
+    """A policy that drives when you permit it, such as one that `demos train` has written."""
     record: Path | None = None
     """Record on the robot, and download the recording to this folder at the end."""
 
@@ -86,7 +86,7 @@ class RobotDrive:
 
 @contextlib.contextmanager
 def recorded_to(data: Path, robot: RobotClient, name: str) -> Generator[None]:
-    """Record on the robot within a block, and fetch it; after an error, print how to fetch it."""
+    """Record on the robot within a block, then fetch the episodes; or print how, after an error."""
     before = begin_recording(robot)
     try:
         yield
@@ -103,7 +103,7 @@ def recorded_to(data: Path, robot: RobotClient, name: str) -> Generator[None]:
 
 
 def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:
-    """Print the policy's state until Ctrl-C or until it fails."""
+    """Print the policy's state until Ctrl-C, until the policy fails, or until the link ends."""
     said = ""
     try:
         while robot.alive:
@@ -248,7 +248,7 @@ class Driving:
                 self._robot.arm()
                 if self._pilot is not None:  # The policy reports its own state.
                     return ""
-                return f"armed for {seen.holder}: any direction takes over, Space stops"
+                return f"armed for {seen.holder}: any driving key takes over, Space stops"
         return "no program waits: start one, and press P while its reset waits"
 
     def _unanswered(self, values: list[float], seen: Observation) -> str:

@@ -51,7 +51,7 @@ class RobotServe(Service):
     """With --gap: seed of the finger drawn from the gap, like finger_seed of Finger-v1."""
 
     def run(self) -> None:
-        """Become the robot's supervisor; return only on an error."""
+        """Become the robot's supervisor, and never return; raise if it cannot be started."""
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
         # `undo` runs only after an error: after `exec`, the supervisor keeps all resources.
@@ -79,7 +79,7 @@ class RobotServe(Service):
             os.execv(plan.python, command)
 
     def _refuse_contradictions(self) -> None:
-        """Refuse options that only apply to a twin."""
+        """Refuse options of a twin without --twin, conflicting options, and invalid numbers."""
         asked = {
             "--clock twin": self.clock == "twin",
             "--wired-as": bool(self.wired_as),
@@ -104,10 +104,10 @@ class RobotServe(Service):
 def place_of(
     profile: Profile, world: str, lenses: Sequence[str], gap: str = "", seed: int | None = None
 ) -> Place:
-    """Return the world of a twin: a plain room, a kind of course, or a finger drawn from a gap.
+    """Return the world of a twin: a plain room, a kind of course, or a finger's rig.
 
     `world` is "room" for the plain room, or "" for the robot's default. If the robot has no
-    default, or MuJoCo is not installed, "" also selects the room.
+    default, or MuJoCo is not installed, "" also selects the room unless a `gap` is given.
     """
     if world == _ROOM or not (world or gap or find_spec("mujoco")):
         if lenses:

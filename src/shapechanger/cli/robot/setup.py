@@ -48,11 +48,11 @@ from shapechanger.robot.setup.install import (
 
 @dataclass(frozen=True)
 class RobotInit:
-    """Create the profile, key and certificate of a new robot, interactively if at a terminal."""
+    """Create a new robot's profile, key and certificate; without arguments, ask at the terminal."""
 
     kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[KIND]")] = ""
     """Name of a shipped profile, such as car. Without any argument, the command asks up to five
-    questions."""
+    questions at a terminal."""
     name: str = ""
     """Name of the robot; the kind if not given."""
     out: Path | None = None
@@ -76,7 +76,7 @@ class RobotInit:
         self._write()
 
     def _ask(self) -> None:
-        """Ask for all settings, each with a default, write the files, and install them on a Pi."""
+        """Ask for kind, name, camera and arming, write the files, and offer to install on a Pi."""
         console, kinds = plain_console(), shipped_profiles()
         say("Kinds of robot:")
         for kind, path in kinds.items():
@@ -148,7 +148,7 @@ class RobotKey:
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Name of the robot."""
     credentials: Path | None = None
-    """Folder of the robot's key and certificate; by default the one that `init` made."""
+    """Folder of the robot's key and certificate; by default the one that `robot init` made."""
     qr: bool = False
     """Show a QR code that opens the console on a phone. It contains the key, so keep it private."""
     address: str = ""
@@ -177,7 +177,7 @@ class RobotKey:
 
 
 def shown_credentials(name: str, credentials: Credentials) -> str:
-    """Return the key and the fingerprint for people to compare, and how to use them elsewhere."""
+    """Return a text with the key, the fingerprint, and how to enter them on a workstation."""
     fingerprint = credentials.fingerprint
     return (
         f"key          {credentials.key}\n"
@@ -220,19 +220,19 @@ class RobotInstall:
     """Install a robot's service, and set up its groups, buses and camera, on a Raspberry Pi."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
-    """The robot's profile, which `init` wrote."""
+    """The robot's profile, which `robot init` wrote."""
     dry_run: bool = False
     """Only print the changes and their commands."""
     remove: bool = False
     """Remove the service; groups and settings of the computer are kept."""
     credentials: Path | None = None
-    """Folder of the robot's key and certificate; by default the one that `init` made."""
+    """Folder of the robot's key and certificate; by default the one that `robot init` made."""
 
     def run(self) -> None:
         self.install(load_profile(own_profile(self.profile)), Machine(getpass.getuser()))
 
     def install(self, profile: Profile, machine: Machine) -> None:
-        """Make the changes on a machine."""
+        """Make the changes on a machine, or only print them; exit with 1 if a change fails."""
         if self.remove:
             machine.require_systemd()
             changes = changes_to_remove(unit_name(profile.name), machine.root)
@@ -268,7 +268,7 @@ class RobotInstall:
         path = profile.path.absolute()
         unit = path.parent / unit_name(profile.name)
         if not unit.exists() and self.dry_run:
-            # Usually `init` has written the unit. With --dry-run, nothing may be written.
+            # Usually `robot init` has written the unit. With --dry-run, nothing may be written.
             raise RobotError(f"{unit} does not exist; without --dry-run, this command writes it.")
         unit, _ = write_unit(profile.name, path, self.credentials, user)
         text = unit.read_text(errors="replace")
