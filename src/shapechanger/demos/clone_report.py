@@ -156,7 +156,7 @@ def scatter_chart(evaluation: EvaluationResult, place: int) -> str:
 
 
 def training_chart(training: Training) -> str:
-    """Plot the training loss (dashed) and the held-out loss (solid) of each network."""
+    """Plot each network's training loss (dashed), held-out loss (solid) and kept step (dot)."""
 
     def draw(_: Figure, axes: Axes) -> None:
         for member, best in enumerate(training.best_steps):

@@ -37,7 +37,7 @@ class Dataset:
         states: Shape (n, k), NaN for unmeasured values; None without states.
         actions: Decided actions, shape (n, m), in the order of the layout.
         episodes: Number of steps of each episode, in order; each positive.
-        times_s: Time of each step since the start of its episode, s, shape (n,).
+        times_s: Time of each step since the first loaded step of its episode, s, shape (n,).
         files: Origin of each step, for people to read; () if unknown.
         action_layout: Meaning of the values of an action.
         state_layout: Meaning of the values of a state; None without states.
@@ -172,7 +172,7 @@ def _part(
     drivers: Collection[str],
     shrink: Shrink | None,
 ) -> tuple[Dataset | None, list[float]]:
-    """Return the steps of some drivers, None without any, and the known times between them, s."""
+    """Return the steps of some drivers, None without any, and the known times between steps, s."""
     chosen: list[Step] = []
     pictures: list[NDArray[np.uint8]] = []
     newest = decoded = None

@@ -29,10 +29,10 @@ EXPERT: Final = "expert"
 Act = Callable[[Any], NDArray[np.float32]]  # A policy, from an observation to an action, (n,).
 
 # The expert takes over if a value of the two actions, such as the steering, has differed by more
-# than _APART for _APART_S without interruption; at once if an obstacle ahead would be reached
-# within _NEAR_S at the present speed, and the policy does not brake; and if the vehicle has stood
-# still for _STILL_S, because such steps would be useless. The policy drives on if no value has
-# differed by more than _AGREE for _AGREE_S without interruption, with no obstacle near.
+# than _APART for _APART_S without interruption, and at once in danger: if the vehicle touches
+# something, would reach an obstacle ahead within _NEAR_S at the present speed while the policy does
+# not brake, or has stood still for _STILL_S, because such steps would be useless. The policy drives
+# on if no value has differed by more than _AGREE, without any danger, for _AGREE_S.
 _APART, _APART_S = 0.6, 0.3
 _NEAR_S: Final = 0.4
 _STILL_S: Final = 2.0
@@ -53,10 +53,10 @@ class Pilot:
     then, so that a learner sees recoveries; the env executes the erroneous action. While it
     corrects a policy, the expert makes no mistakes.
 
-    A slow policy is not corrected: any throttle from rest to the expert's counts as agreement.
-    Dangers are detected in the `world` of the env, if it has one. While a
-    policy may be corrected, `steps` counts all decisions, `corrected` the decisions of the expert,
-    and `takeovers` how often the expert took over.
+    A policy that is only slower than the expert is not corrected: any throttle from rest to the
+    expert's counts as agreement. Dangers are detected in the `world` of the env, if it has one.
+    While a policy may be corrected, `steps` counts all decisions, `corrected` the decisions of the
+    expert, and `takeovers` how often the expert took over.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Pilot:
         self.steps = self.corrected = self.takeovers = 0
 
     def begin(self) -> None:
-        """Start an episode, in which a policy drives first."""
+        """Start an episode, in which the policy drives first if there is one."""
         self._corrects, self._lasted = False, 0
         if self._expert is not None:
             self._expert.begin()
@@ -194,7 +194,7 @@ def record_steps(
     seed: int,
     on_step: Callable[[int], object] = lambda steps: None,
 ) -> None:
-    """Record a number of steps in episodes with consecutive seeds; the last one is always closed.
+    """Record a number of steps in episodes with consecutive seeds; always close the last episode.
 
     `on_step` is called after each step with the number of steps so far.
     """

@@ -1,6 +1,6 @@
-"""Record episodes of any Gymnasium env, one per reset.
+"""Record episodes of a Gymnasium env that publishes layouts, one per reset.
 
-In addition to observations and actions, a step keeps these if the env has them: in `info`,
+In addition to observations and actions, a recording keeps these if the env has them: in `info`,
 `captured_ns`, `decided_ns`, `action_applied`, `intervene_action`, `absent` (names of missing state
 values), `reward_terms`, `stop_reason`, `truncated_because` and `is_success`; on the unwrapped env,
 `newest_jpeg` (bytes of the image as received), `record_clock` and `welcome`.
@@ -100,12 +100,12 @@ def name_of(env: gym.Env[Any, Any]) -> str:
 class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]]):
     """Wrapper that records the observations and actions of an env.
 
-    A step holds an observation, the action decided for it, and the outcome. If a person
-    intervened (`info["intervene_action"]`), the person's action is recorded as decided, and the
-    action passed to `step` as the action of a policy.
+    A step holds an observation, the action decided for it, the reward and further results. If a
+    person intervened (`info["intervene_action"]`), the person's action is recorded as decided, and
+    the action passed to `step` as the action of a policy.
 
-    If a step cannot be written, the wrapper stops the env with one action at rest, and `step`
-    raises the error; all earlier steps are complete.
+    If a step cannot be written and the env has not ended, the wrapper stops the env with one action
+    at rest. `step` raises the error; all earlier steps are complete.
 
     Args:
         env: Env with layouts, whose observations are an image, a state, or a Dict of `image` and
@@ -207,7 +207,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         """
         if self._header is None:
             raise gym.error.ResetNeeded("Call reset() before the first step of an episode.")
-        writer, self._writer = self._writer, None  # Stays None if the next one fails.
+        writer, self._writer = self._writer, None  # Stays None if no new writer can be made.
         if writer is None:  # Check the folder before the env moves.
             writer = EpisodeWriter.create(self._recording, self._header)
         elif writer.is_full:
@@ -246,7 +246,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         except ShapechangerError as error:
             if not (terminated or truncated):
                 self._stop(error)
-            with suppress(ShapechangerError):  # On a full disk; `demos repair` closes the episode.
+            with suppress(ShapechangerError):  # If this fails, `demos repair` closes the episode.
                 self.end("failed")
             raise
         return observation, reward, terminated, truncated, info
@@ -262,7 +262,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         self._writer.mark(text)
 
     def end(self, outcome: str = "") -> None:
-        """Close the episode, if one is open; steps until the next reset are not recorded.
+        """Close the episode, if one is open; `step` needs a reset afterwards.
 
         Args:
             outcome: How the episode ended; "" if unspecified.

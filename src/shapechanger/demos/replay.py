@@ -28,7 +28,7 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
     expert's intended actions may differ from them.
     """
     header, kept = episode.header, episode.kept
-    states: list[NDArray[np.float64]] = []  # Differences.
+    states: list[NDArray[np.float64]] = []  # Absolute differences of the states.
     images: list[float] = []
     rewards: list[tuple[float, float]] = []
     # The recorded arguments are used only in the recorded env.
@@ -80,8 +80,8 @@ def _differences(
 ) -> Iterator[str]:
     """Describe differences.
 
-    `images` are mean differences of 255 levels, `states` differences, shape (n, size), and
-    `rewards` the rewards recorded and now.
+    `images` are the mean differences of images, 0 to 255; `states` are absolute differences, shape
+    (n, size); and `rewards` are pairs of the recorded reward and the reward of the replay.
     """
     if any(images):
         mean = np.mean(images)

@@ -18,7 +18,8 @@ from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 from shapechanger.reports.page import jpeg_uri, render
 
-# Largest number of images on a page, so that browsers can open pages of a hundred episodes.
+# Images on a page of up to 100 episodes, in addition to marked ones: browsers can open such a page.
+# With more episodes, each has `_MIN_PER_EPISODE` images.
 _MAX_PICTURES: Final = 600
 _MIN_PER_EPISODE, _MAX_PER_EPISODE = 6, 24
 _MAX_MARKED: Final = 12
@@ -46,7 +47,7 @@ class Distribution(NamedTuple):
 
 
 def distributions(episodes: Sequence[Episode]) -> list[Distribution]:
-    """Return the distributions of actions, measurements and times between steps.
+    """Return the distributions of the first actions, some measurements, and times between steps.
 
     Numbers of the same name and unit are pooled over episodes. Dropped steps do not count.
     """
@@ -119,7 +120,7 @@ def _histogram(found: Distribution) -> dict[str, Any]:
 
 
 def _timeline(episode: Episode) -> dict[str, Any]:
-    """Return the runs of each driver, and up to `_MAX_POINTS` points, -1 to 1, of each action."""
+    """Return the runs of each driver, and points, -1 to 1, of the first four actions over time."""
     layout, first = episode.header.action_layout, episode.steps[0].index
     runs: list[tuple[int, int, str]] = []
     for who, run in groupby(episode.steps, lambda step: _who(episode, step)):
@@ -147,7 +148,7 @@ def _who(episode: Episode, step: Step) -> str:
 
 
 def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
-    """Return up to `most` evenly spaced images of an episode, and the images at its marks."""
+    """Return up to `most` evenly spaced images of an episode, and those at the first marks."""
     # Time at which each step starts, s.
     starts_s = accumulate(episode.durations_s, initial=0.0)
     seen = [pair for pair in zip(episode.steps, starts_s, strict=False) if pair[0].frame]

@@ -126,7 +126,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         _require(self, shares, "in [0, 1)", lambda x: 0.0 <= x < 1.0)
 
     def steps(self, pictures: int) -> int:
-        """Return the number of training steps for this many images."""
+        """Return the number of training steps for this many examples."""
         wanted = round(self.passes * pictures / self.batch)
         return min(max(wanted, self.fewest_steps), self.most_steps)
 
@@ -171,7 +171,7 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
     """Crop and reduce uint8 images, (n, H, W, 3), to the shape (n, height, width, 3) of a framing.
 
     Each pixel is the mean of its area, rounded half up. Images that already have the target size
-    are returned unchanged, and those of another type or shape are refused.
+    are returned unchanged, and arrays of another type or shape are refused.
     """
     shape = pictures.shape
     if len(shape) != 4 or shape[3] != 3 or 0 in shape[1:] or pictures.dtype != np.uint8:
@@ -233,7 +233,7 @@ class ShrunkFrames:
         return prepare(picture[None], self.framing)[0]
 
     def digest(self, actions: NDArray[np.float32]) -> str:
-        """Return a digest of the demonstrations."""
+        """Return a digest of the frames that were read and of these actions."""
         return hashlib.sha256(b"".join(self.seen) + actions.tobytes()).hexdigest()
 
 
@@ -254,7 +254,7 @@ class Clone(Policy):
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m)."""
+        """Return class probabilities, shape (n, classes), or scaled actions, (n, m), -1 to 1."""
         given = zip(("picture", "state"), prepared(self.card, pictures, states), strict=True)
         return self._run({name: part for name, part in given if part is not None})
 
@@ -276,7 +276,8 @@ class Clone(Policy):
             states: Shape (n, k), NaN for unknown values; None for a policy without a state.
 
         Returns:
-            Actions, shape (n, m). For a vehicle: steering (-1 is left), throttle (1 is forward).
+            Actions, shape (n, m), in the card's action layout; without one, steering (-1 is left)
+            and throttle (1 is forward).
 
         Raises:
             DemosError: If an input is missing or has another shape.
@@ -342,7 +343,8 @@ def targets(net: CloneNetwork, actions: NDArray[np.float32]) -> NDArray[Any]:
     """Return the target outputs of a network for actions of shape (n, m).
 
     They are class indices, shape (n,), -1 for an unknown action, or actions scaled to [-1, 1],
-    shape (n, m). An action outside [-1, 1] is refused if the network states no other range.
+    shape (n, m). If the network states a range, actions outside it are clipped; otherwise actions
+    outside [-1, 1] are refused.
     """
     if net.classes:
         return class_numbers(actions, net.classes)

@@ -1,4 +1,4 @@
-"""Choose the outputs of a clone from the demonstrated actions, and evaluate a clone."""
+"""Choose a clone's output encoding from the demonstrated actions, and evaluate a clone."""
 
 from __future__ import annotations
 

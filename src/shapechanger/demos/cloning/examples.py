@@ -54,7 +54,7 @@ class Mirror:
         return values[:, list(self.order)] * np.asarray(self.signs, np.float32)
 
     def balance(self, actions: NDArray[np.float32]) -> float:
-        """Return how evenly actions steer to both sides: 0 for one side only, 1 for equal shares.
+        """Return how evenly actions steer: 0 if to one side only, 1 if equally to both, or to none.
 
         In a drive that turns to one side only, the mirror image would teach the wrong turn.
         """
@@ -64,7 +64,7 @@ class Mirror:
 
 
 def mirror_of(layout: Layout) -> Mirror:
-    """Return the mirror of a layout: steering changes its sign, left and right are swapped."""
+    """Return the mirror of a layout; DemosError if the mirror image of a feature is unknown."""
     values: list[tuple[int, float, float]] = []
     names = layout.names
     for place, feature in enumerate(layout):
@@ -85,8 +85,8 @@ def mirror_of(layout: Layout) -> Mirror:
 def evaluated_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[np.bool_]:
     """Return a mask of the steps to hold out to evaluate a policy on: the last share, in [0, 1).
 
-    `episodes` are lengths. By "time", the share is of all steps; by "episode", the last episodes
-    that have at least the share are held out, at least one, but never all.
+    `episodes` are lengths. By "time", the share is of all steps; by "episode", unless the share is
+    0, the fewest last episodes that have at least the share are held out, but never all episodes.
     """
     if not 0.0 <= share < 1.0:
         raise DemosError(f"The held-out share must be in [0, 1), got {share}.")
@@ -174,7 +174,7 @@ and targets, (batch, m), or (batch,) for classes."""
 class Examples(NamedTuple):
     """Prepared images, (n, height, width, 3), states, (n, 2, k), and targets of training examples.
 
-    Targets are actions, (n, 2, m), or class indices, (n, 2); the second of two is mirrored.
+    Targets are actions, (n, 2, m), or class indices, (n, 2); the second is mirrored, or repeated.
     """
 
     pictures: NDArray[np.uint8] | None

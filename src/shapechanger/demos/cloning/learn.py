@@ -1,4 +1,4 @@
-"""Behaviour cloning: any actions from any demonstrations."""
+"""Behaviour cloning: learn the actions of demonstrations from their images, states or both."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class MemberCheck(msgspec.Struct, frozen=True):
 class Training:
     """Course of a training: validations, and the step of each member whose weights were kept.
 
-    `mirror_note` states the share of mirrored images and its reason; "" if the settings state it.
+    `mirror_note` states the share of mirrored images and its reason; "" if the settings' is used.
     """
 
     checks: tuple[MemberCheck, ...]
@@ -93,11 +93,11 @@ def learn(
 ) -> tuple[CameraPolicy, Training]:
     """Learn the actions of a driver, and return the policy and the course of its training.
 
-    The policy is the mean of several networks, each of which uses another stretch of time for early
-    stopping. Equal arguments give an equal policy on the same machine with the same number of
-    threads.
+    If the settings have several `members`, the policy is the mean of their networks, each of which
+    uses another stretch of time for early stopping. Equal arguments give an equal policy on the
+    same machine with the same number of threads.
 
-    `start` is a policy of the same layouts to train further; its single network keeps its inputs
+    `start` is a policy of the same layouts to train further, as one network with the same inputs
     and outputs. `rehearsal` is data that this policy was trained on, mixed in against forgetting.
     If the driver is `symmetric`, steering to both sides equally in the long run, as an
     expert in random worlds does, the settings state the share of mirrored images; otherwise the
@@ -227,7 +227,7 @@ def _loss(out: Tensor, target: Tensor, smoothing: float = 0.0) -> Tensor:
 
 @torch.no_grad()
 def _begin(network: CameraNetwork, shown: Plain) -> None:
-    """Initialise the output to the mean action or the frequencies, and normalise the states."""
+    """Initialise the output to the mean action or class frequencies, and normalise the states."""
     _, states, targets = shown
     if classes := network.card.network.classes:
         counts = np.bincount(targets, minlength=len(classes)) + 1.0
@@ -254,7 +254,7 @@ def _fit(
     member: int,
     report: Callable[[MemberCheck], None],
 ) -> int:
-    """Train a network in place to its best weights in `total` steps, and return their step."""
+    """Train a network in place for `total` steps; keep its best weights, and return their step."""
     rate = settings.further_rate if network.card.network.seeds else settings.learning_rate
     optimizer = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=settings.weight_decay)
     every = max(total // settings.checks, 1)
@@ -300,7 +300,7 @@ def _fit(
 
 
 def best_temperature(logits: Tensor, target: Tensor) -> float:
-    """Return the best temperature for logits, (n, classes), and class indices, (n,)."""
+    """Return the best temperature for logits, (n, classes), and classes, (n,); 1 if n < 20."""
     if len(target) < _MIN_CALIBRATION_STEPS:
         return 1.0
     losses = [float(functional.cross_entropy(logits / t, target)) for t in _TEMPERATURES]

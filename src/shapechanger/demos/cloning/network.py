@@ -40,9 +40,9 @@ _MAX_DEVIATIONS: Final = 5.0  # Larger deviations of a state value carry no more
 
 
 def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
-    """Return the strength of the edges of each direction in each cell, relative to their mean.
+    """Return the square root of the strength of edges of each direction in each cell.
 
-    Images are in [0, 1], shape (n, 3, height, width); strengths are at least 0, shape
+    Images are in [0, 1], shape (n, 3, height, width); strengths are relative to their mean, shape
     (n, DIRECTIONS, rows, columns) for the given rows and columns of cells.
     """
     light = torch.log(pictures.mean(dim=1, keepdim=True) + _DARK)
@@ -173,7 +173,7 @@ class CameraNetwork(nn.Module):
 
 
 class CameraPolicy(Clone):
-    """A clone whose network is of PyTorch."""
+    """A clone whose network runs in PyTorch, and which can be trained further and saved."""
 
     def __init__(self, network: CameraNetwork, card: PolicyCard) -> None:
         self.network = network.eval()
@@ -230,9 +230,9 @@ class CameraPolicy(Clone):
     def export(self, path: Path) -> None:
         """Write the policy as ONNX, which a robot runs without PyTorch.
 
-        Its inputs are `picture`, uint8 of the shape (n, height, width, 3) that the card's framing
-        gives, and `state`, float32 of shape (n, values); its output is `output`, float32: actions
-        in [-1, 1], or probabilities of the card's classes.
+        Its inputs, if the policy uses them, are `picture`, uint8 of the shape (n, height, width, 3)
+        that the card's framing gives, and `state`, float32 of shape (n, values); its output is
+        `output`, float32: actions scaled to [-1, 1], or probabilities of the card's classes.
         """
         kinds = {"picture": torch.uint8, "state": torch.float32}
         shapes = self.card.shapes
@@ -254,7 +254,7 @@ def seeded(seed: int) -> Generator[None]:
 
 
 def joined(card: PolicyCard, members: Sequence[CameraNetwork]) -> CameraNetwork:
-    """Return one network, as a card describes it, whose output is the mean of its members."""
+    """Return one network, as a card describes it, which averages its members before activation."""
     network = CameraNetwork(card)
     for name in ("eyes", "nerves"):
         for one, member in zip(getattr(network, name) or (), members, strict=False):

@@ -1,7 +1,7 @@
 """Cloned policies as starting points for reinforcement learning with Stable-Baselines3.
 
 The encoders of the clone are frozen, and the learner works on their features: this is many times
-faster than on images, and untrained critics cannot destroy what cloning has learned.
+faster than on images, and untrained critics cannot destroy the encoders.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class ClonedPolicy(ActorCriticPolicy):
 def as_sac(
     policy: CameraPolicy, size: tuple[int, int] | None, *, seed: int = 0, **settings: Any
 ) -> SAC:
-    """Return the policy as a SAC model on raw observations; its `save` writes a file.
+    """Return the policy as a SAC model of Stable-Baselines3 on raw observations.
 
     Its deterministic action equals the policy's. Its critics are untrained, and lead the actor
     astray at first. `size` is the rows and columns of the raw images, None without images. The
@@ -101,7 +101,8 @@ def as_sac(
     replay buffer holds 10,000 observations.
     """
     if policy.net.classes:
-        raise PolicyError("This policy has classes, but SAC needs the head regression: use PPO.")
+        text = "This policy chooses among fixed actions, but SAC needs numbers"
+        raise PolicyError(f"{text}: use PPO, or train the policy with --head regression.")
     settings = {"learning_starts": 0, "buffer_size": _BUFFER, "device": "cpu", **settings}
     kwargs = _perception(policy) | {
         # No layer between features and actions, as in the policy.
@@ -123,7 +124,7 @@ def as_sac(
 def as_ppo(
     policy: CameraPolicy, size: tuple[int, int] | None, *, seed: int = 0, **settings: Any
 ) -> PPO:
-    """Return the policy as a PPO model on raw observations, as `as_sac` does.
+    """Return the policy as a PPO model, as `as_sac` does; `settings` are arguments of PPO.
 
     The actions of a policy with classes are indices of `policy.net.classes`: wrap the env in
     `gymnasium.wrappers.TransformAction`.
@@ -170,7 +171,7 @@ def _perception(policy: CameraPolicy) -> dict[str, Any]:
 
 
 def _copy_weights(policy: CameraPolicy, hands: nn.Module, *owners: Any) -> None:
-    """Copy the output layer of a policy, and its encoders to the owners of a perception."""
+    """Copy a policy's output layer to `hands`, its encoders to each owner's features extractor."""
     hands.load_state_dict(policy.network.hands.state_dict())
     state = policy.network.state_dict()
     known = {name: value for name, value in state.items() if not name.startswith("hands.")}

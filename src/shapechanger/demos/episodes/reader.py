@@ -59,7 +59,7 @@ class Episode:
         drops: Ranges of excluded and of included steps, in the order in which they were written;
             later ones override earlier ones.
         closed: Whether the episode was closed properly.
-        outcome: How it ended; "" if unspecified.
+        outcome: How it ended; "" if unspecified or not closed.
     """
 
     path: Path
@@ -90,7 +90,8 @@ class Episode:
     def durations_s(self) -> tuple[float, ...]:
         """How long each step lasted, until the time of the next one, s.
 
-        A step lasts one period if it is the last one, if a pause follows, or if a time is unknown.
+        A step lasts one period if it is the last one, if a pause follows, if its time or the next
+        one is unknown, or if time runs backwards.
         """
         hz = self.header.control_hz
         passed = (_passed_s(one, two) for one, two in pairwise(self.steps))
@@ -114,7 +115,7 @@ class Episode:
 
     @property
     def origin(self) -> str:
-        """Name of its env or robot, as short as possible."""
+        """Short name of its env, or else its robot, kind of robot or source."""
         header = self.header
         return header.env.split("/")[-1] or header.robot or header.body or header.source
 
@@ -161,7 +162,7 @@ def read_episode(path: Path) -> Episode:
 
     Raises:
         DemosError: If the folder is not an episode, or has another version of the format.
-        BrokenEpisode: If a line or an image is damaged or missing.
+        BrokenEpisode: If a line is damaged, or an image is missing or has another size.
     """
     header, outcome = read_header(path)
     lines: list[Step | Edit | None] = []
@@ -186,7 +187,7 @@ _OUTLINES: Final = msgspec.json.Decoder(_StepTimes | Edit)
 def read_outline(path: Path) -> Episode:
     """Read the times and edits of an episode quickly, without checks of lines and images.
 
-    Its steps have no other fields; lines that are incomplete or not valid JSON are left out.
+    Other fields of steps are not read; lines that are incomplete or not valid JSON are left out.
 
     Raises:
         DemosError: If the header is missing or cannot be read.
@@ -265,13 +266,13 @@ def _checked_lines(
 
 
 def episodes_of(data: Path) -> tuple[Path, ...]:
-    """Return the folders of the episodes of a recording, oldest first.
+    """Return the folders of the episodes of a recording, by name: oldest first unless renamed.
 
     Args:
         data: Folder of a recording, or of one episode.
 
     Raises:
-        DemosError: If the episode does not exist.
+        DemosError: If there is no episode.
     """
     if is_episode(data):
         return (data,)
@@ -314,7 +315,7 @@ def repair(path: Path) -> str:
 
     Raises:
         DemosError: If the folder is not an episode, or is being recorded now.
-        OutputError: If it cannot be written to; the episode is unchanged then.
+        OutputError: If it cannot be written to; no line and no image is lost then.
     """
     header, outcome = read_header(path)
     done: list[str] = []

@@ -200,7 +200,7 @@ class StepPicture(msgspec.Struct, frozen=True, array_like=True):
         return self == StepPicture.of(self.name, jpeg)
 
     def read(self, frames: Path, *, checksum: bool = True) -> bytes:
-        """Read the image, or only its size without `checksum`.
+        """Read and check the image; without `checksum`, only check its size, and return b"".
 
         Raises:
             ValueError: If the image is missing or was changed; the message is part of a sentence.
@@ -278,7 +278,7 @@ class Step(
         return "" if is_finite else f"its action is {list(self.action)}"
 
     def to_json(self) -> dict[str, Any]:
-        """Return the step as JSON can hold it; empty fields are left out.
+        """Return the step as JSON can hold it; fields with their default value are left out.
 
         NaN becomes null, and an infinity a string.
         """
@@ -363,8 +363,8 @@ def longest_period_s(control_hz: float) -> float:
 def rate_jitter(periods_s: Sequence[float], control_hz: float) -> float:
     """Return how far the rate of a recording varied, as a share of its nominal rate, `control_hz`.
 
-    It is the larger deviation of the 5th and the 95th percentile of the times between steps, s; at
-    most 0.25, and 0 for fewer than 20 times.
+    It is the larger deviation of the 5th and the 95th percentile of the times between steps,
+    `periods_s`, from the nominal period; at most 0.25, and 0 for fewer than 20 times.
     """
     if len(periods_s) < _MIN_PERIODS:
         return 0.0
@@ -373,7 +373,7 @@ def rate_jitter(periods_s: Sequence[float], control_hz: float) -> float:
 
 
 def is_same_rate(recorded_hz: float, control_hz: float, jitter: float = 0.0) -> bool:
-    """Return whether a robot has the rate of a recording, within 1 % or its `rate_jitter`."""
+    """Return whether two rates are equal, within 1 % or, if larger, the recording's jitter."""
     allowed = max(_SAME_RATE, min(jitter, _MOST_JITTER))
     return abs(recorded_hz / control_hz - 1.0) <= allowed
 
@@ -416,6 +416,6 @@ def parse_line(line: bytes) -> Step | Edit | None:
 
 
 def write_header(folder: Path, header: EpisodeHeader, closed: dict[str, Any] | None) -> None:
-    """Write the header of an episode atomically, with how it was closed."""
+    """Write the header of an episode atomically; `closed` is its ending, None while it is open."""
     text = json.dumps(header.to_json() | {"closed": closed}, indent=1, ensure_ascii=False)
     write_atomic(folder / HEADER, f"{text}\n".encode())

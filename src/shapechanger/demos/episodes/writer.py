@@ -1,4 +1,4 @@
-"""Episode writer: a crash at any time costs at most the step being written."""
+"""Episode writer: a crash of the program costs at most the step being written."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ class EpisodeWriter:
 
     Readers refuse files above a limit, so a recorder calls `continued` once the episode `is_full`.
     A thread flushes files to disk once a second, because a memory card may take longer than a
-    control period: a power cut costs at most a second. A crash of the program alone costs nothing,
-    because the kernel already has the bytes.
+    control period: a power cut costs about a second. A crash of the program alone costs no written
+    step, because the kernel already has the bytes.
 
     Attributes:
         path: Folder of the episode.
@@ -105,7 +105,7 @@ class EpisodeWriter:
         Args:
             recording: Folder of the recording.
             header: Metadata of the episode.
-            spare_bytes: Disk space to leave free. A full disk would harm the robot.
+            spare_bytes: Disk space to leave free, because other programs of a robot need it.
             now: Time that the folder is named after, UTC; None for the present.
             created: Start time of an episode that was recorded before, ISO 8601; "" if unknown;
                 None for `now`.
@@ -149,10 +149,10 @@ class EpisodeWriter:
         return self._bytes >= FULL_BYTES
 
     def continued(self) -> EpisodeWriter:
-        """Close the episode, and return the writer of the next one, with the newest image.
+        """Close the episode, and return the writer of the next one, which may reuse its last image.
 
         Raises:
-            OutputError: If the next one cannot be created; this one is closed then.
+            OutputError: If the next episode cannot be created; this one is closed then.
         """
         self.close("continued")
         # The next episode does not begin with a reset of the env.
@@ -164,7 +164,7 @@ class EpisodeWriter:
 
     @property
     def seconds(self) -> float:
-        """Duration of the kept steps, s."""
+        """Time from the first to the last kept step, s."""
         return (self._times[-1][1] - self._times[0][1]) / _NS_PER_S if self._times else 0.0
 
     def add(self, step: Step, jpeg: bytes | None = None) -> int:
@@ -179,7 +179,8 @@ class EpisodeWriter:
             Index of the step.
 
         Raises:
-            DemosError: If the step does not fit the header, or time runs backwards.
+            DemosError: If the step does not fit the header, its image is not a JPEG, or time runs
+                backwards.
             OutputError: If it cannot be written; earlier steps are intact.
         """
         self._require_open()
@@ -232,9 +233,7 @@ class EpisodeWriter:
         self.marks += 1
 
     def undo(self, seconds: float = 5.0) -> int:
-        """Exclude the newest kept step, and those less than `seconds` before it.
-
-        They stay in the file.
+        """Exclude the newest kept step and steps less than `seconds` before it; they stay on disk.
 
         Args:
             seconds: How far to go back from the newest kept step, s; positive and finite.

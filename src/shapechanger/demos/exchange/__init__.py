@@ -1,9 +1,9 @@
 """Import and export of recordings in other formats.
 
-The module of a format reads folders into `ExchangeEpisode`s, writes such episodes to folders, and
-declares a `Format`. `base.COLUMNS` maps the fields of a step to the columns of each format. `files`
-and `video` load and check untrusted files. Damaged parts are left out and reported with the reason.
-Sources are never changed, and targets appear atomically.
+The module of a format declares a `Format`: it reads folders into `ExchangeEpisode`s, writes such
+episodes to folders, or both. `base.COLUMNS` maps the fields of a step to the columns of each
+format. `files` and `video` load and check untrusted files. Imports that are not strict leave
+damaged parts out and report the reason. Sources are never changed, and targets appear atomically.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ _Part = tuple[Episode, Sequence[Step], str]  # An episode, some of its steps, an
 
 
 def _consecutive(chosen: Sequence[_Part], form: Format, notes: list[str]) -> list[_Part]:
-    """Split episodes at excluded or missing steps and at pauses, and add notes about it."""
+    """Split episodes at pauses and excluded or missing steps; refuse different layouts or rates."""
     parts: list[_Part] = []
     off_s = 0.0
     chosen = [part for part in chosen if part[1]]
@@ -218,7 +218,7 @@ def _consecutive(chosen: Sequence[_Part], form: Format, notes: list[str]) -> lis
 
 
 def _passed_s(one: Step, two: Step, unknown_s: float = 0.0) -> float:
-    """Return the time between two steps on the robot's clock, s."""
+    """Return the time between two steps on the robot's clock, s; `unknown_s` without times."""
     for now, later in ((one.decided_ns, two.decided_ns), (one.captured_ns, two.captured_ns)):
         if now is not None and later is not None:
             return (later - now) / 1e9
@@ -237,7 +237,7 @@ def import_episodes(path: Path, context: ImportContext | None = None) -> Iterato
         The episodes; their steps are read when they are iterated.
 
     Raises:
-        DemosError: If something is damaged or missing, possibly while an episode is iterated.
+        DemosError: If `path` or an episode cannot be read, or a strict context refuses a part.
         MissingExtra: If a package that the format needs is not installed.
     """
     yield from _read(path, "auto", context or ImportContext(strict=True))[1]

@@ -83,7 +83,7 @@ class ExchangeRecord:
     """A step that is imported or exported.
 
     Attributes:
-        step: The step; its index and the name of its frame are ignored.
+        step: The step; an import ignores its index and the name of its frame.
         jpeg: JPEG of the step's image; the same object in successive records that share an image.
             Readers of formats leave it None, and the import sets it from `image`.
         marks: Texts of the step's marks.
@@ -175,7 +175,7 @@ class ImportContext:
 
     @property
     def findings(self) -> tuple[ImportFinding, ...]:
-        """All findings, such as "record 12, record 15, and 2 more: an empty image"."""
+        """All findings, such as "record 12, record 15: an empty image"."""
         found = self._found.items()
         return tuple(ImportFinding(k, f"{few(n)}: {text}" if n else text) for (k, text), n in found)
 
@@ -188,7 +188,7 @@ class ExportContext:
         out: The folder that the user asked for; the writer's folder is renamed to it at the end.
         task: What the robot does, in words; "" if not given.
         images: Whether to store images as they were recorded, instead of video.
-        rewarded: Whether all steps have a reward.
+        rewarded: Whether all kept steps have a reward.
     """
 
     out: Path
@@ -254,7 +254,7 @@ def whole_records(episode: ExchangeEpisode, context: ImportContext) -> Iterator[
 
 
 def _loaded(record: ExchangeRecord, size: _Size = None) -> tuple[bytes | None, _Size]:
-    """Return the image of a record as JPEG, and its size; set a fault if the image is damaged."""
+    """Return a record's image as JPEG, and its size; set a fault if damaged or of another size."""
     if not record.fault and record.image is not None:
         try:
             jpeg, found = load_jpeg(record.image)
@@ -296,8 +296,8 @@ def drives(
     """Yield the drives of a source that may lack its rate and the size of its images.
 
     Sessions, from one start of the robot to the next, are split at pauses and where time runs
-    backwards; their records have `captured_ns`. Records with a damaged image, or an image of
-    another size than most, are left out before rates and pauses are measured. `stated_hz` is the
+    backwards, if their records have times, `captured_ns`. Records with a damaged image, or an image
+    of another size than most, are left out before rates and pauses are measured. `stated_hz` is the
     rate that the source states; times that contradict it are left out.
     """
     sizes = [_loaded(record)[1] for record in chain(*sessions)]
@@ -409,7 +409,7 @@ def features_of(
     low: Sequence[float] = (),
     high: Sequence[float] = (),
 ) -> list[Feature]:
-    """Return the features of an imported column: named, numbered, or one array; unit "?"."""
+    """Return a column's features: named, numbered, or one array; unit "?" if none is known."""
     units = units if len(units) == size and all(units) else ("?",) * size
     lows = low or (-inf,) * size
     highs = high or (inf,) * size

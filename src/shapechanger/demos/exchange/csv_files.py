@@ -1,8 +1,8 @@
 """CSV: a folder with `header.json`, `steps.csv` and `frames/` for each episode.
 
-Numbers are read back exactly. An empty cell is a missing value, and `nan` is a value that was not
-measured. Texts are JSON with quotes, so that spreadsheets do not evaluate them as formulas, and
-line ends and other special characters are kept.
+Numbers are read back exactly. An empty cell is a field that a step lacks, and `nan` is a value that
+was not measured. Free texts are JSON with quotes, so that spreadsheets do not evaluate them as
+formulas, and line ends and other special characters are kept.
 
 Without a header, `steps.csv` is a table of another program. Its columns are found by their names or
 aliases, and its images are in the same folder.
@@ -45,7 +45,7 @@ _Columns = Mapping[str, Sequence[str]]  # Names of columns, keyed by field of a 
 
 
 def _tables_of(folder: Path) -> list[Path]:
-    """Return the tables in the folder itself, or in its subfolders."""
+    """Return the table in the folder itself, or else the tables in its subfolders."""
     own = folder / _TABLE
     return [own] if own.is_file() else sorted(filter(Path.is_file, folder.glob(f"*/{_TABLE}")))
 
@@ -197,7 +197,7 @@ def _records(
 def _fields(
     cells: Mapping[str, str], columns: _Columns, factors: Mapping[str, int]
 ) -> dict[str, Any]:
-    """Return the fields of a step from the cells of its line, without fields of empty cells."""
+    """Return the fields of a step from its cells; empty cells are left out, or NaN in a state."""
     fields: dict[str, Any] = {"driver": "person"} if factors else {}
     fields["state"] = [math.nan] * len(columns["state"])
     for field, names in columns.items():

@@ -1,7 +1,7 @@
 """Read files and images of datasets within limits, and create folders atomically.
 
-A text may have `MAX_TEXT_BYTES`, an image `MAX_PICTURE_BYTES` and `MAX_PIXELS`, and compressed data
-`MAX_UNPACKED` bytes. Only regular files inside the folder are read. All functions raise
+A text may have up to `MAX_TEXT_BYTES`, an image `MAX_PICTURE_BYTES` and `MAX_PIXELS`, and
+compressed data `MAX_UNPACKED` bytes. Only regular files are read. Functions that read raise
 `DemosError` for invalid input, and `MissingExtra` if a package is not installed.
 """
 
@@ -32,7 +32,7 @@ from shapechanger.errors import DemosError, LayoutError, MissingExtra, OutputErr
 from shapechanger.files import read_file, reading, writing
 
 MAX_UNPACKED: Final = 64 << 20  # Unpacked bytes in memory; `MAX_PIXELS` need 48 MiB.
-MAX_VALUES: Final = 1 << 17  # Of a feature.
+MAX_VALUES: Final = 1 << 17  # Largest number of values of a feature.
 _JPEG, _PNG = b"\xff\xd8", b"\x89PNG"
 _PNG_DEPTH: Final = slice(24, 25)  # Byte of a PNG with the number of bits per value.
 
@@ -194,8 +194,8 @@ def own_episodes(
 ) -> list[tuple[EpisodeHeader, str, Iterator[Driver]]]:
     """Return the header, the outcome and the drivers of each episode that Shapechanger exported.
 
-    The section must have `count` episodes, with layouts and images of the sizes in `found`. It is
-    None in datasets of other programs, for which [] is returned.
+    `section` is their part of the dataset's metadata. It must have `count` episodes, with layouts
+    and images of the sizes in `found`. For None, as in datasets of other programs, [] is returned.
     """
     if section is None:
         return []

@@ -9,8 +9,9 @@ meta/shapechanger.json                                         headers and drive
 ```
 
 LeRobot computes the time of a step from its number and the rate, so the robot's clock is not kept.
-Numbers have 32 bits. A state that was not measured becomes the middle of its range, because one NaN
-would make all statistics of a dataset NaN.
+With `images`, the images are in the table instead of videos. Actions, states and rewards have 32
+bits. A state that was not measured becomes the middle of its range, because one NaN would make all
+statistics of a dataset NaN.
 
 Statistics have LeRobot's keys (`compute_stats.py` of lerobot 0.4.4); docs/exchange.md says where
 their numbers differ.
@@ -49,8 +50,8 @@ _ACTION, _STATE, _CAMERA, _REWARD, _TERMINATED = (
 )
 _DATA_PATH: Final = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _VIDEO_PATH: Final = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
-# LeRobot finds an image by its time in the file, a 32-bit number with an error of at most 0.1 ms.
-# This precision suffices for 1000 s.
+# LeRobot finds an image by its time in the file, a 32-bit number that must be right within 0.1 ms,
+# as it is for the first 1000 s.
 _VIDEO_FILE_S: Final = 500.0
 _ROWS: Final = 256  # Rows in memory at once, which may have images.
 _SMALLEST_FRACTION: Final = 10_000  # Largest denominator of a rate: 19.98 Hz is 999/50.

@@ -10,7 +10,7 @@
 ```
 
 Messages are JSON, and their schemas state the units. Log times are unchanged times of the robot's
-clock, ns: the time of the capture for images and states, and of the decision for actions. A step
+clock, ns: of the capture for images and states, and of the decision for other messages. A step
 with an unknown time follows the step before after one period; a first step is at 0. The header of
 the episode is the metadata `shapechanger`. Format: mcap.dev/spec.
 """

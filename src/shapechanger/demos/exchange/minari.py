@@ -98,7 +98,7 @@ class _Space(msgspec.Struct, kw_only=True):
             yield column, self
 
     def bounds(self) -> list[list[float]]:
-        """Return the low and high bounds of the numbers; [] if not numeric, or too many."""
+        """Return the low and high bounds of the numbers; [] for spaces that are not imported."""
         shape, low, high = self.shape, self.low, self.high
         match self.type:
             case "Box":

@@ -162,7 +162,7 @@ def _read_v2(folder: Path, context: base.ImportContext) -> _Tub:
 
 
 def _read(folder: Path, context: base.ImportContext) -> Iterator[base.ExchangeEpisode]:
-    """Yield the episodes of a tub: its sessions, divided at pauses and where time jumps."""
+    """Yield a tub's episodes: its sessions, divided at pauses and where time runs backwards."""
     is_v2 = (folder / _MANIFEST).is_file()
     tub = (_read_v2 if is_v2 else _read_v1)(folder, context)
     if len(tub.inputs) != len(tub.types):
@@ -241,7 +241,7 @@ def _record(number: int, fields: Fields, sensed: Sequence[str]) -> base.Exchange
 def _find_images(
     records: list[base.ExchangeRecord], names: list[Any], images: Path, context: base.ImportContext
 ) -> None:
-    """Set the image of each record from its name, or a fault if the name is invalid."""
+    """Set each record's image from its name, or a fault if the name is missing, wrong or shared."""
     shown = Counter(str(name) for name, one in zip(names, records, strict=True) if not one.fault)
     for record, name in zip(records, names, strict=True):
         if record.fault:

@@ -23,7 +23,7 @@ from shapechanger.errors import DemosError, OutputError, translate_errors
 # `crf` is the quality, from 0 (lossless) to 51; docs/exchange.md has the measured error. Every
 # second image is a key frame, so that learners can read single images quickly.
 _CODING: Final = {"crf": "18", "g": "2", "bf": "0"}
-_MAX_SAMPLES: Final = 1 << 21  # Images of a video: 10 hours at 60 Hz. FFmpeg's index has 50 MB.
+_MAX_SAMPLES: Final = 1 << 21  # 10 hours of images at 60 Hz, for which FFmpeg's index has 50 MB.
 
 
 class VideoWriter:
@@ -74,10 +74,10 @@ class VideoTimes(NamedTuple):
 
 
 def _require_whole(path: Path) -> None:
-    """Refuse an MP4 file that is cut off, or whose tables claim far more than it can contain.
+    """Refuse an MP4 file that is cut off, or has tables that are too large, long or compressed.
 
-    Before FFmpeg reads a sample, it allocates an entry for each claimed sample, and again for each
-    edit; for sound, an entry for each 1024 samples of a chunk (ISO/IEC 14496-12, 4.2, 8.6-8.8).
+    Before FFmpeg reads a sample, it allocates an entry for each claimed sample, as many again for
+    each edit, and for sound one per 1024 samples of a chunk (ISO/IEC 14496-12, 4.2, 8.6-8.8).
     """
     at, size, tables = 0, path.stat().st_size, bytearray()
     with path.open("rb") as file:
@@ -106,7 +106,8 @@ def _require_whole(path: Path) -> None:
         each = np.frombuffer(table[: len(table) // 12 * 12], ">u4")[1::3]
         samples += int(each.max(initial=0)) // 1024 * claimed(b"stco|co64", 4)
     if samples * (1 + claimed(b"elst", 4)) > _MAX_SAMPLES or b"cmov" in tables:
-        raise DemosError(f"{path} claims to have more than {_MAX_SAMPLES} images.")
+        text = f"{path} claims to have more than {_MAX_SAMPLES} images"
+        raise DemosError(f"{text}, or has compressed tables.")
 
 
 @contextmanager
