@@ -20,7 +20,7 @@ def _jpeg(number: int, width: int = 32, height: int = 24) -> bytes:
 
 
 def _recorded(recording: Path, steps: int = 6, **changes: Any) -> Path:
-    """Record an episode with a new frame at every second step, whose last step is the policy's."""
+    """Record an episode with a new frame at every second step; a policy drives the last step."""
     about = header(**({"image_size": (32, 24)} | changes))
     with EpisodeWriter.create(recording, about, spare_bytes=0) as writer:
         for number in range(steps):
@@ -61,7 +61,7 @@ def test_parts_are_merged_to_the_whole(tmp_path: Path) -> None:
         np.testing.assert_array_equal(getattr(whole, name), getattr(data, name))
 
 
-def test_a_shared_frame_is_kept_for_its_step_and_shrunk(tmp_path: Path) -> None:
+def test_a_frame_shared_with_a_skipped_step_is_loaded_and_shrunk(tmp_path: Path) -> None:
     with EpisodeWriter.create(tmp_path, header(image_size=(32, 24)), spare_bytes=0) as writer:
         writer.add(step(0, driver="policy"), _jpeg(5))
         writer.add(step(1))

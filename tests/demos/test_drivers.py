@@ -32,7 +32,7 @@ RIGHT = np.array([0.0, 0.5], np.float32)  # What the expert of the corridor inte
 def recorded(
     folder: Path, act: Act | None, expert: AlwaysForward | None, steps: int = 25
 ) -> list[Episode]:
-    """Record in the corridor, whose episodes have at most 40 steps."""
+    """Record in the corridor, which takes at most 40 steps at half throttle."""
     with RecordEpisodes(CorridorEnv("state"), folder) as env:
         record_steps(env, Pilot(env, act, expert), steps, seed=5)
     return [read_episode(path) for path in episodes_of(folder)]
@@ -61,7 +61,7 @@ def test_only_corrections_are_learned_from(tmp_path: Path) -> None:
 
 
 class Corrected:
-    """A policy, given as its actions, in a world that may touch something."""
+    """A policy whose actions are given, and an expert that corrects it; it may touch something."""
 
     def __init__(self, right: np.ndarray[Any, Any] = RIGHT) -> None:
         env: Any = CorridorEnv()
@@ -75,7 +75,7 @@ class Corrected:
         self.pilot = Pilot(env, lambda seen: seen, expert)
 
     def decide(self, wanted: Any, *, danger: bool = False) -> tuple[str, str]:
-        """Return who drives, and the remark."""
+        """Return the first letter of the driver, and the remark."""
         self.world.touches = danger
         _, decided, remark = self.pilot.decide(np.array(wanted, np.float32))
         return decided.driver[0], remark

@@ -1,4 +1,4 @@
-"""Reports of a recording: statistics, the page, and actions drawn into images."""
+"""Reports of a recording: statistics, the page, and actions drawn below images."""
 
 from __future__ import annotations
 

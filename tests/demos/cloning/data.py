@@ -55,8 +55,8 @@ def clone_card(
 def stripes(n: int, seed: int, layout: Layout = KEYS) -> Dataset:
     """Return dark noise with a stripe on the left, in the middle or on the right.
 
-    The side, -1, 0 or 1, sets the steering. The first value of the state is twice the side, and the
-    last equals the first value of the action.
+    The side, -1, 0 or 1, sets the steering or the key that is held. The first value of the state is
+    twice the side, and the last equals the first value of the action.
     """
     rng = np.random.default_rng(seed)
     side = rng.integers(-1, 2, n)

@@ -70,7 +70,7 @@ class Answers:
 
 
 def scores(done: NDArray[np.float64], wanted: NDArray[np.float64], layout: Layout) -> list[float]:
-    """Return all metrics of outputs; larger values are better."""
+    """Return the metrics of outputs without classes; larger values are better."""
     shown = stripes(len(wanted), 0, layout)
     data = dataclasses.replace(shown, actions=wanted, pictures=None)
     report = evaluate(Answers(done), data)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
@@ -140,7 +140,7 @@ def test_keys_become_classes_with_names() -> None:
     assert targets(card, _keys("LFNB")).tolist() == [1, 0, 2, -1]
 
 
-def test_numbers_are_scaled_by_their_layout() -> None:
+def test_numbers_are_scaled_by_their_range() -> None:
     layout = Layout((Feature("a", "N", 0.0, 10.0), Feature("b", "m"), Feature("c", "m")))
     actions = np.stack([np.linspace(2, 8, 50), np.linspace(-3, 5, 50), np.ones(50)], axis=1)
     card = _card(actions.astype(np.float32), layout)
@@ -148,7 +148,7 @@ def test_numbers_are_scaled_by_their_layout() -> None:
     np.testing.assert_allclose(targets(card, actions[:1]), [[-0.6, -1.0, -1.0]], atol=1e-6)
 
 
-def test_unsuitable_classes_are_refused() -> None:
+def test_too_many_classes_and_equal_actions_are_refused() -> None:
     rng = np.random.default_rng(0)
     many = rng.uniform(-1, 1, (200, 2)).astype(np.float32)
     with pytest.raises(DemosError, match="200 different actions, but at most 16"):

@@ -38,7 +38,7 @@ def _augmented(seed: int = 0, **changes: float) -> tuple[Tensor, Tensor, Tensor,
     return seen, wanted, scaled(pictures), actions
 
 
-def test_each_image_is_mirrored_with_its_action() -> None:
+def test_actions_are_mirrored_with_their_images() -> None:
     seen, wanted, before, actions = _augmented(mirror=0.5)
     turned = (seen == before.flip(3)).all(dim=(1, 2, 3))
     kept = (seen == before).all(dim=(1, 2, 3))

@@ -1,4 +1,4 @@
-"""Preparation of images for a policy, and their edges: invariant to light and colour."""
+"""Preparation of images for a policy, and their edges, which hardly depend on light and colour."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_each_direction_has_its_channel() -> None:
     assert float(upright[0]) > 5.0 * float(upright[1:].max())
 
 
-def test_neither_light_nor_colour_matters() -> None:
+def test_edges_hardly_depend_on_light_and_colour() -> None:
     before = edges(_bars(True), (4, 4))
     yellow = torch.tensor([1.0, 0.9, 0.4]).view(1, 3, 1, 1)
     for other in (0.5 * _bars(True), yellow * _bars(True)):

@@ -79,7 +79,7 @@ def test_files_have_the_same_card_and_actions(kind: str, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("vehicle", CLONES)
-def test_the_clones_of_the_package_drive(vehicle: str) -> None:
+def test_the_clones_of_the_package_return_valid_actions(vehicle: str) -> None:
     actions = load_policy(CLONES[vehicle]).act(np.zeros((2, 120, 160, 3), np.uint8))
     assert actions.shape == (2, 2)
     assert np.abs(actions).max() <= 1.0
@@ -91,7 +91,7 @@ def test_predictions_hardly_depend_on_brightness() -> None:
     np.testing.assert_allclose(predicted, policy.predict_many(2 * dark), atol=0.02)
 
 
-def test_missing_inputs_are_refused() -> None:
+def test_missing_inputs_and_wrong_shapes_are_refused() -> None:
     policy = CameraPolicy.blank(_CARDS["both, several"], 0)
     with pytest.raises(DemosError, match="Images must be uint8"):
         policy.predict(np.zeros((50, 50), np.uint8), _STATES[0])
@@ -154,7 +154,7 @@ def _model(operator: str = "Identity", domain: str = "", card: str = "", **more:
 
 
 _PROVIDER = "TensorrtExecutionProvider"
-# A network that was compiled for a provider.
+# A network that was compiled for one of onnxruntime's execution providers.
 _COMPILED = _model("EPContext", "com.microsoft", ep_cache_context="x", source=_PROVIDER)
 
 
@@ -165,7 +165,7 @@ _COMPILED = _model("EPContext", "com.microsoft", ep_cache_context="x", source=_P
         (_model(), "no card of Shapechanger"),
         (_model(card="{}"), "missing required field"),
         (_model(card=msgspec.json.encode(clone_card()).decode()), "its card says"),
-        # An operator that only the provider of somebody's accelerator has.
+        # An operator of an accelerator, which onnxruntime does not have.
         (_model("Turbo", domain="com.accelerator"), "com.accelerator:Turbo"),
         (_COMPILED, "not compatible with any execution provider"),
     ],

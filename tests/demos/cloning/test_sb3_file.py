@@ -23,7 +23,7 @@ _SHORT = msgspec.structs.replace(QUICK, fewest_steps=20, most_steps=20)
 
 
 class _World(gym.Env[Any, Any]):
-    """An env that shows stripes and rewards throttle."""
+    """An env that shows stripes and rewards the second value of an action."""
 
     def __init__(self, layout: Layout, inputs: Inputs) -> None:
         self._data, self._inputs, self._at = stripes(20, 9, layout), inputs, 0

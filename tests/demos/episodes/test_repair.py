@@ -177,9 +177,7 @@ def test_episodes_without_a_start_time_are_told_apart_by_their_steps(tmp_path: P
     assert [len(read_episode(path).steps) for path in episodes_of(out)] == [0, 1, 1]
 
 
-def test_a_failed_write_names_the_place_and_leaves_nothing_behind(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failed_write_names_the_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, file = recorded(tmp_path / "data"), tmp_path / "file"
     file.touch()
 

@@ -34,7 +34,7 @@ def shown_in(jpeg: bytes) -> int:
 
 
 def write_video(path: Path, numbers: Sequence[int], fps: float, *options: str) -> None:
-    """Encode images whose brightness is their number."""
+    """Encode images whose brightness shows their number."""
     path.parent.mkdir(parents=True, exist_ok=True)
     raw = b"".join(np.full((SIZE, SIZE, 3), _LEVELS * n, np.uint8).tobytes() for n in numbers)
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{SIZE}x{SIZE}", "-r", f"{fps}"]
@@ -58,11 +58,11 @@ def write_set(
     info: Mapping[str, Any] | None = None,
     video: bool = True,
 ) -> Path:
-    """Write a dataset in which the first action and the image show the number of the step.
+    """Write a dataset in which the first value of the action and the image show the step's number.
 
-    Episodes have these lengths. The video shows the images of these numbers, by default one for
-    each step, and is encoded with these options of FFmpeg. `rows` and `places` change the rows of
-    the data and of `meta/episodes`; the others add features and columns, and change `info.json`.
+    Episodes have these lengths. The video shows the images of the numbers `pictures`, by default
+    one for each step, and is encoded with these options of FFmpeg. `rows` and `places` change the
+    rows of the data and of `meta/episodes`; `features`, `columns` and `info` add to them.
     """
     total = sum(lengths)
     numbers = [(e, n) for e, length in enumerate(lengths) for n in range(length)]

@@ -112,7 +112,7 @@ def tub_folder(
     inputs: dict[str, str] | None = None,
     per_catalog: int = 2,
 ) -> Path:
-    """Create a tub of version 2; records without the field of an image get an image."""
+    """Create a tub of version 2; each record gets an image unless it sets `cam/image_array`."""
     (folder / "images").mkdir(parents=True)
     kinds = {"cam/image_array": "image_array", "user/angle": "float"} | (inputs or {})
     lines: list[dict[str, Any]] = []
@@ -157,7 +157,7 @@ def all_of(data: Path) -> list[Episode]:
 
 
 def content_of(episode: Episode) -> dict[str, Any]:
-    """Return an episode as text without its name and start time, so that NaN equals NaN."""
+    """Return an episode as JSON without its name and start time, so that NaN equals NaN."""
     head = episode.header.to_json()
     del head["created"]
     kept = {step.index for step in episode.kept}

@@ -1,4 +1,4 @@
-"""Damaged or unsuitable input raises a one-sentence error, and nothing is written."""
+"""Damaged or unsuitable input is refused in one sentence, or only its intact lines are imported."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def _spoilt(file: h5py.File) -> None:
 
 
 def _with_rest(text: str) -> Callable[[Path], None]:
-    """Return a change of the fields of the first step that have no column."""
+    """Return a change of `infos/step` of the first step: the fields that have no column."""
     return _in_file(lambda file: file["episode_0/infos/step"].__setitem__(0, text))
 
 
@@ -192,7 +192,7 @@ def test_a_dataset_that_cannot_be_read(
 
 
 def test_folders_of_unknown_format(tmp_path: Path) -> None:
-    """Empty, missing, ambiguous and parent folders each have an error."""
+    """Empty, missing and ambiguous folders, files, and recordings each have an error."""
     out = tmp_path / "data"
     (tmp_path / "empty").mkdir()
     assert "nothing that can be imported" in refused(tmp_path / "empty", out)

@@ -1,4 +1,4 @@
-"""Imports from all formats."""
+"""Imports of tables, tubs and Minari datasets, and exports that Minari itself loads."""
 
 from __future__ import annotations
 

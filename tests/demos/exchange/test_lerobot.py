@@ -56,7 +56,7 @@ def pictures_of(episode: Episode) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("images", [False, True])
 def test_a_round_trip(tmp_path: Path, images: bool) -> None:
-    """Numbers are rounded to 32 bits, video is nearly the same, and the rest is kept."""
+    """Numbers are rounded to 32 bits, video is nearly the same; headers and drivers are kept."""
     smooth_drive(tmp_path / "data", 30, seed=7, env="shapechanger/Car-v1")
     smooth_drive(tmp_path / "data", 4)
     done = export_recording(tmp_path / "data", tmp_path / "out", "lerobot", images=images)
@@ -192,7 +192,7 @@ def test_a_shapechanger_json_that_does_not_match_is_refused(tmp_path: Path) -> N
         own.write_text(json.dumps(about | changes))
         with pytest.raises(DemosError, match=problem):
             import_recording(tmp_path / "set", tmp_path / "back")
-    # Steps beyond the end of the episode are ignored, and not expanded in memory.
+    # Drivers of steps beyond the end of the episode are ignored, and not expanded in memory.
     runs = {"drivers": [["policy", 1 << 30]]}
     own.write_text(json.dumps(about | {"episodes": [episode | runs]}))
     import_recording(tmp_path / "set", tmp_path / "back")

@@ -28,7 +28,7 @@ COUNT = 16
 
 
 def plain(number: int, channels: int = 3) -> np.ndarray:
-    """Return an image whose brightness is its number."""
+    """Return an image whose brightness shows its number."""
     return np.full((SIZE, SIZE, channels), 6 * number, np.uint8).squeeze()
 
 
@@ -185,7 +185,7 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
     ],
 )
 def test_refused_imports(tmp_path: Path, options: Any, message: str) -> None:
-    """The error is one sentence, and no folder is left behind."""
+    """No folder is left behind."""
     folder = write_set(tmp_path / "set", **({} if callable(options) else options))
     if callable(options):
         options(folder)

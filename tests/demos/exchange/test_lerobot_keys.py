@@ -137,7 +137,7 @@ def every(change: Any) -> Any:
 def test_contradictions_are_left_out(
     tmp_path: Path, options: dict[str, Any], episodes: list[int], reason: str
 ) -> None:
-    """An episode whose keys disagree is not imported, and the report states by how much."""
+    """An episode whose keys or times disagree is not imported, and the report states the reason."""
     pairs, context = pairs_of(write_set(tmp_path / "set", **options))
     assert pairs == [BOTH[number] for number in episodes]
     assert re.search(reason, findings_of(context)), context.findings
@@ -225,7 +225,7 @@ def test_a_damaged_image(tmp_path: Path) -> None:
 
 
 def test_a_video_of_too_many_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Images above the limit are refused before they are decoded, for any stated size."""
+    """The episodes of a video whose images have more pixels than the limit are left out."""
     folder = write_set(tmp_path / "set")
     monkeypatch.setattr(video, "MAX_PIXELS", SIZE * SIZE - 1)
     pairs, context = pairs_of(folder)

@@ -70,7 +70,7 @@ def test_every_value_is_there(exported: Path) -> None:
     start = 7 * 10**9 + 5
     times = [at for at, _ in of(found, "/state")]
     assert times == [start, start + 10**8, start + 2 * 10**8]
-    # Quantities without a measurement are left out.
+    # Quantities without a measurement are left out, or null in an array.
     assert [content for _, content in of(found, "/state")] == [
         {"map": [1.0, None]},
         {"speed": 2.0, "map": [3.0, 4.0]},
@@ -104,7 +104,7 @@ def test_every_value_is_there(exported: Path) -> None:
         ([-5, None, 250], [0, 100, 250]),
     ],
 )
-def test_unknown_times_fit_the_known_ones(
+def test_unknown_times_follow_at_the_rate(
     tmp_path: Path, clock_ns: list[int | None], expected_ns: list[int]
 ) -> None:
     about = header(state_layout=Layout(()), image_size=None, control_hz=10.0)

@@ -1,4 +1,4 @@
-"""An export followed by an import returns the same recording."""
+"""An export followed by an import returns the same recording, as far as the format stores it."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def test_a_tub_round_trips(tmp_path: Path) -> None:
 
 
 def with_a_pause(data: Path) -> Path:
-    """Record eight steps: four 50 ms apart and, after a pause of 7 s, four 80 ms apart."""
+    """Record eight steps: four 50 ms apart and, after a pause of about 7 s, four 80 ms apart."""
     times_ns = [n * 50_000_000 if n < 4 else 7 * 10**9 + n * 80_000_000 for n in range(8)]
     steps = [
         Step(action=(n / 10, 0.0), driver="person", state=(0.0, 0.0), captured_ns=0, decided_ns=at)
@@ -191,7 +191,7 @@ def test_steps_that_do_not_follow_each_other_are_separate_episodes(
 @pytest.mark.parametrize(
     ("clock", "captured_ns", "wall_ns"),
     [
-        # The twin ran at a third of real time, and then the computer's clock was set back.
+        # The twin ran three times as fast as real time, and the computer's clock was set back.
         (
             "twin",
             [7_000 * _MS + n * 50 * _MS for n in range(16)],

@@ -53,7 +53,7 @@ def test_deletions_refer_to_the_index(
     chosen: st.DataObject,
     per_catalog: int,
 ) -> None:
-    """Catalogs before the first index were removed."""
+    """The tub begins at any index, as if earlier catalogs were removed."""
     kept = chosen.draw(st.integers(first, first + count - 1))
     indexes = st.integers(first, first + count - 1)
     deleted = chosen.draw(st.sets(indexes.filter(lambda n: n != kept)))
@@ -224,7 +224,7 @@ def test_a_damaged_manifest(tmp_path: Path, lines: int) -> None:
 def test_rates_by_times(
     tmp_path: Path, period_ms: float, stated: object, hz: float | None, rate: float, finding: str
 ) -> None:
-    """Millisecond times give exact rates; times that contradict a stated rate are left out."""
+    """Rates are right within 0.2 %; times that contradict a stated rate are left out."""
     made = records(60, period_ms=period_ms, **NO_IMAGE)
     folder = tub_folder(tmp_path / "tub", made, range(20, 30))
     if stated is not None:
@@ -326,7 +326,7 @@ def test_depth_and_lists_are_named(tmp_path: Path) -> None:
 
 
 def test_unknown_times_and_starts(tmp_path: Path) -> None:
-    """A drive with a record without a time has neither times nor a start time."""
+    """If a record lacks a time, all are left out; without times, rate and start are unknown."""
     made = records(4, **NO_IMAGE)
     made[2]["_timestamp_ms"] = None
     _, done = imported(tub_folder(tmp_path / "tub", made))
