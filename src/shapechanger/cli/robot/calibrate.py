@@ -1,4 +1,4 @@
-"""`shapechanger robot calibrate`: jog servos and motors, and write the results to the profile."""
+"""`shapechanger robot calibrate`: jog outputs or find zeros, and write them to the profile."""
 
 from __future__ import annotations
 
