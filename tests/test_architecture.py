@@ -3,6 +3,7 @@
 import ast
 import importlib
 import importlib.util
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -90,6 +91,22 @@ def test_imports_inside_functions_are_few_and_have_reasons() -> None:
                         near = lines[node.lineno - 2 : node.end_lineno]
                         assert any("# " in line for line in near), (path, node.lineno)
     assert 0 < found <= 40
+
+
+def test_the_picture_of_the_architecture_shows_the_imports() -> None:
+    """Except those of `cli`, which imports everything, and of the files that all import."""
+    apart = {"cli", "contract", "errors", "files", "identity", "layout", "registry"}
+    found: set[tuple[str, str]] = set()
+    for path in _SRC.rglob("shapechanger/*/**/*.py"):
+        package = path.relative_to(_SRC / "shapechanger").parts[0]
+        names = re.findall(r"from shapechanger\.(\w+)", path.read_text())
+        found |= {(package, name) for name in names if name != package}
+    picture = (_SRC.parent / "CONTRIBUTING.md").read_text()
+    drawn = re.findall(r"^ +(\w+) --> (.+)$", picture, re.MULTILINE)
+    arrows = {(one, other) for one, others in drawn for other in others.split(" & ")}
+    assert {arrow for arrow in arrows if "cli" not in arrow} == {
+        arrow for arrow in found if not apart & {*arrow}
+    }
 
 
 def test_no_program_is_started_from_the_command_line_package() -> None:
