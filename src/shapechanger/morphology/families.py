@@ -123,7 +123,7 @@ def interpolate(a: Body, b: Body, alpha: float) -> Body:
 
 
 def _key(edit: Edit) -> Hashable:
-    """Return what two edits must share to be interpolated: everything but their numbers.
+    """Return the parts that two edits must share to be interpolated: all but their numbers.
 
     If only one edit has a motor, the edits between them have one with a gear that fades to zero.
     """
