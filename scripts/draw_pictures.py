@@ -21,7 +21,6 @@ from PIL import Image
 
 from shapechanger.cli.transfer import Transfer
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.study_films import median_index, view_distance
 from shapechanger.files import read_json
 from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
@@ -29,6 +28,7 @@ from shapechanger.reports.films import write_film
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED
 from shapechanger.transfer.plan import Run
 from shapechanger.transfer.references import reference_policy
+from shapechanger.transfer.report.films import median_index, view_distance
 from shapechanger.transfer.study import STUDY_FILE, Study
 from shapechanger.vehicles.courses.course import FLOODED
 from shapechanger.vehicles.envs.demonstrators import CLONES

@@ -17,7 +17,6 @@ from rich.table import Table
 from shapechanger.cli.console import command_line, interruptible, plain_console, print_table, say
 from shapechanger.cli.transfer import StudyRuns, run_showing_progress
 from shapechanger.envs.catalogue import allow_own_modules, default_learner
-from shapechanger.envs.study_films import film_study
 from shapechanger.envs.suite_file import (
     SuiteFile,
     load_suite,
@@ -40,6 +39,7 @@ from shapechanger.transfer.plan import (
     planned_arms,
     read_plan,
 )
+from shapechanger.transfer.report.films import film_study
 from shapechanger.transfer.report.study import write_study_report
 from shapechanger.transfer.report.suite import FilmStrip, Sweep, suite_html
 from shapechanger.transfer.runs import last_evaluation, load_result

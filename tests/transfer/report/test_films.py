@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from shapechanger.envs.catalogue import driven, env_ref
-from shapechanger.envs.study_films import film_study
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import learner_settings, resolve_learner
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.references import reference_policy
+from shapechanger.transfer.report.films import film_study
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.studies import tiny_plan
 
@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
 @pytest.fixture(autouse=True)
 def short_films(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shapechanger.envs.study_films._FILM_S", 0.5)
+    monkeypatch.setattr("shapechanger.transfer.report.films._FILM_S", 0.5)
 
 
 def test_every_policy_is_filmed(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef, hold_out, measures_of
-from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.reports.films import write_film
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act
@@ -66,9 +65,10 @@ def film_study(
     scenes = _scenes(study, folder, source_policy, drives)
     # Bodies of one family are drawn at the same scale.
     distances: dict[str, float] = {}
-    for env in (scene.env for scene in scenes if scene.env.id in CATALOGUE):
-        family = CATALOGUE[env.id].family
-        distances[family] = max(view_distance(env), distances.get(family, 0.0))
+    for env in [] if drives else [scene.env for scene in scenes]:
+        family = _family_of(env)
+        if family:
+            distances[family] = max(view_distance(env), distances.get(family, 0.0))
     for scene in scenes:
         frames, fps, measured = _play(scene, distances, shadows, drives)
         if not frames:
@@ -91,8 +91,14 @@ def film_study(
     return strips
 
 
+def _family_of(env_ref: EnvRef) -> str:
+    """Return the family of an env whose body may be reshaped, and thus drawn; "" for others."""
+    with closing(env_ref.make()) as env:
+        return str(getattr(env.unwrapped, "family_name", ""))
+
+
 def view_distance(env_ref: EnvRef) -> float:
-    """Return the distance from which frames of an env of the catalogue show its body, m."""
+    """Return the distance from which frames of an env of a family show its body, m."""
     with closing(env_ref.make()) as env:
         inner: Any = env.unwrapped
         return float(inner.mujoco_renderer.default_cam_config["distance"])
@@ -134,14 +140,14 @@ def _play(
 ) -> tuple[list[NDArray[np.uint8]], float, str]:
     """Return frames, their rate, Hz, and a text with the default measure over them."""
     size: dict[str, Any] = {}
-    entry = CATALOGUE.get(scene.env.id)
+    family = "" if drives else _family_of(scene.env)
     if not drives:
         finer = {"width": _FINER * _WIDTH, "height": _FINER * _HEIGHT}
-        size = {"render_mode": "rgb_array", **finer, **({"shadows": shadows} if entry else {})}
+        size = {"render_mode": "rgb_array", **finer, **({"shadows": shadows} if family else {})}
     with closing(scene.env.make(**size)) as env:
         inner: Any = env.unwrapped
-        if entry:
-            inner.mujoco_renderer.default_cam_config["distance"] = distances[entry.family]
+        if family:
+            inner.mujoco_renderer.default_cam_config["distance"] = distances[family]
 
         def frame() -> NDArray[Any]:
             if drives:
