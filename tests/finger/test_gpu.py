@@ -277,7 +277,7 @@ def test_time_limits_restart_fingers_alone(parameters: Any) -> None:
 
 
 def test_a_reset_can_replace_a_finger() -> None:
-    """The world then has the arms, motors and history of the new finger."""
+    """The world then has the motors and history of the new finger; unsuitable ones are refused."""
     bodies, arguments = KINDS["late"]
     worlds, _ = many("late")
     late: Any = {"command_delay": 0.0173, "motor_lag": 0.01}

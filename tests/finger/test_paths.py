@@ -322,7 +322,7 @@ def test_invalid_files_are_refused(
         from_csv(write("\n".join(["t,x,y,z", *rows, ""])))
 
 
-def test_files_without_the_columns_are_refused(write: Callable[[str], File]) -> None:
+def test_unreadable_files_and_other_columns_are_refused(write: Callable[[str], File]) -> None:
     for text, names in (("\n\n", "none"), ("t,x,x,y,z\n", "t, x, x, y, z")):
         with pytest.raises(PathError, match=f"names the columns {names} in its first line"):
             from_csv(write(text))

@@ -1,4 +1,4 @@
-"""`Finger-v1`: episodes, observations, rewards, errors, and the model-based controller."""
+"""`Finger-v1`: episodes, observations, rewards and errors; and the controller in both tasks."""
 
 from typing import Any
 

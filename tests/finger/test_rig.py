@@ -124,7 +124,7 @@ def test_absent_measurements_keep_their_last_value() -> None:
 
 
 def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
-    """A lost turn of any spool is detected; errors of the arms of 20 % are tolerated."""
+    """A lost turn of a small spool, 31 mm, is detected; errors of arms of 20 % are tolerated."""
     rng = np.random.default_rng(0)
     senses, (low, high) = _encoders(), JOINT_RANGE.T
     for _ in range(300):
@@ -147,7 +147,7 @@ def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
         ({"finger_seed": 3}, FingerError, "selects a finger of a gap"),
     ],
 )
-def test_impossible_twins_are_refused(
+def test_unknown_robots_and_impossible_twins_are_refused(
     arguments: dict[str, Any], error: type[Exception], sentence: str
 ) -> None:
     with pytest.raises(error, match=sentence):

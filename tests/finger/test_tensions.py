@@ -41,7 +41,7 @@ def test_arms_that_do_not_span_are_detected() -> None:
 
 
 def _problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Draw arms, a torque and bounds; half of the torques are feasible."""
+    """Draw arms, a torque and bounds; the torque is feasible for an even seed."""
     rng = np.random.default_rng(seed)
     arms = _ARMS * (1.0 + rng.uniform(-0.3, 0.3, _ARMS.shape))
     low = rng.uniform(0.0, 2.0, 7)

@@ -34,7 +34,7 @@ _ENDS: Final = (-np.ones(len(TENDONS)), np.ones(len(TENDONS)))
 
 
 class FingerController:
-    """Moves the fingertip to the target in its observation: the upper reference for policies.
+    """Moves the fingertip to the target in the observation; policies are compared with it.
 
     Each step computes the angles for the target (inverse kinematics), the speeds that lead there,
     and the torques for these speeds by the finger's model (inertia, weight, passive tissue). Then
@@ -100,8 +100,8 @@ class FingerController:
         return np.clip(command, -1.0, 1.0).astype(np.float32)
 
 
-# Frequencies of the motions, Hz. Ten seconds contain several periods of each frequency; delay and
-# lag would blur faster motions.
+# Frequencies of the motions, Hz. Ten seconds contain 1.5 to 9 periods; delay and lag would blur
+# faster motions.
 _SLOWEST_HZ, _FASTEST_HZ = 0.15, 0.9
 _WAVES: Final = 4
 # With a spread above 1, signals are more often near the ends of a range than in its middle. Moment
@@ -122,11 +122,11 @@ _MOST_OFF: Final = 0.4
 
 
 class FingerBabble:
-    """Controller that moves the joints along independent smooth random motions.
+    """Controller that moves the joints along smooth random motions.
 
-    The controller assumes the nominal finger, and corrects errors of the measured angles, the
-    features `JOINT/angle` of the layout. The lowest tensions vary over time. An action, whose
-    meaning is `actions`, lasts `control_dt` seconds.
+    Three joints move independently; the end joint stays near its coupled angle. The controller
+    assumes the nominal finger, and corrects errors of measured angles, `JOINT/angle`. The lowest
+    tensions vary over time. An action, whose meaning is `actions`, lasts `control_dt` seconds.
     """
 
     def __init__(
@@ -178,8 +178,8 @@ def _signals(waves: tuple[NDArray[np.float64], NDArray[np.float64]], t: float) -
     """Return smooth signals at a time, s, that are mostly near 0 or 1: (signals,)."""
     hz, phase = waves
     total = np.sin(2.0 * np.pi * hz * t + phase).sum(axis=1)
-    # The sum is nearly normal with a variance of one half per wave, so its cumulative distribution
-    # makes the values nearly uniform.
+    # The sum is nearly normal with a variance of one half per wave. With a spread of 1, the normal
+    # distribution function would make the values nearly uniform.
     return np.asarray(ndtr(_SPREAD * total / np.sqrt(0.5 * _WAVES)), np.float64)
 
 

@@ -1,4 +1,4 @@
-"""Base class of the finger envs: the plant, the spaces and rendering."""
+"""Base class of the finger envs: the simulated finger, actions, rewards and rendering."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         actions: Meaning of an action; see `shapechanger.finger.tensions.DRIVES`.
         parameters: Parameters of the finger: `FingerParameters`, their JSON, a mapping of changed
             parameters, or the name of a set, "an-1983"; None for the nominal finger.
-        gap: Distribution, or its name, from which the finger is drawn instead of using
-            `parameters`; see `shapechanger.finger.gap`.
+        gap: Distribution from which the finger is drawn instead of using `parameters`, its name or
+            a mapping of its ranges; see `shapechanger.finger.gap`.
         finger_seed: Seed of the finger drawn from the gap; None draws another finger at each reset
             (domain randomisation).
         reward: Weights that replace the default ones, keyed by name.
@@ -79,8 +79,8 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     Raises:
         UnknownName: If the mode of action, gap, parameter, weight or render mode is unknown.
-        FingerError: If the parameters contradict each other, if both parameters and a gap are
-            given, or if the moment arms do not let the tendons balance the joints.
+        FingerError: If an argument is invalid, both parameters and a gap are given, `finger_seed`
+            has no gap, or the tendons cannot balance the joints (only "an-1983" is allowed).
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it without ClassVar.
@@ -216,7 +216,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return float(np.linalg.norm(self.plant.fingertip - self._target))
 
     def render(self) -> Any:
-        """Return a frame of `render_mode`, or None without a render mode.
+        """Return a frame; None in the mode "human", or without a render mode.
 
         Raises:
             RenderError: If this machine cannot render.
@@ -243,7 +243,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return np.abs(self.plant.data.actuator_force) / self._most
 
     def _shown(self) -> FingerFigure:
-        """Return a visible model of the present finger; the simulated model has no visuals."""
+        """Return a model of the present finger with bones and routes of tendons, to be drawn."""
         if self._figure is None:
             self._figure = FingerFigure()
         self._figure.show(self.plant.angles, self._pulled, self.plant.data.mocap_pos[0])
@@ -272,7 +272,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def motors(self) -> FingerParameters | None:
-        """A nominal finger with the motors and command path of this one; None without a path."""
+        """This path and tension range in a nominal finger on geared servos; None without a path."""
         own = self.parameters
         if own.path is None:
             return None
@@ -309,11 +309,10 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return {"gap": "wide", "reward": _CALM}
 
     def identified_source(self, seed: int) -> dict[str, Any]:
-        """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
+        """Identify this finger, and return arguments of `Finger-v1` for a finger like it.
 
-        The finger moves for ten seconds, determined by `seed`. A log hardly reveals parameters of
-        the motors. For a finger with a command path, these parameters are drawn for each
-        episode as in the gap "wide".
+        The finger moves for ten seconds, determined by `seed`. For a finger with a command path,
+        each episode draws another finger from the gap `geared_around` the identified one.
         """
         # Imported here, because an env that only steps does not need the optimiser.
         from shapechanger.finger.identify import identify, record_babble
@@ -339,7 +338,7 @@ def as_finger(value: FingerLike | None) -> FingerParameters:
         require_known("parameter of a finger", FingerParameters.__struct_fields__, *named)
         given = NOMINAL.replace(**named)
     if not isinstance(given, FingerParameters):
-        raise FingerError(f"Parameters of a finger must be numbers or JSON, got {given!r}.")
+        raise FingerError(f"A finger must be parameters, JSON, a mapping or a name, got {given!r}.")
     if given not in PARAMETER_SETS.values() and not spans_all_torques(given.arms):
         raise FingerError(
             "The tendons cannot balance the joints: tendons only pull, so with these moment arms "

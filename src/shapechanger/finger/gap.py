@@ -27,7 +27,7 @@ _LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"}
 # of joints; measured by `benchmarks.finger_identify`.
 _FOUND: Final = 0.03
 _JOINTS_FOUND: Final = 0.2
-# Largest error of an identified delay, s: chosen, few errors are larger (`benchmarks.finger_path`).
+# Error of an identified delay, s: chosen so that few errors are larger (`benchmarks.finger_path`).
 _DELAY_FOUND_S: Final = 0.005
 
 Range = tuple[float, float]
@@ -123,11 +123,11 @@ _RIG: Final = NOMINAL.replace(
 _RIG_MOST_N: Final = (15.0, 15.0, 7.0, 15.0, 6.4, 15.0, 15.0)  # In the order of `TENDONS`.
 _RIG_LEAST_N: Final = 1.0
 
-# A finger on the shipped rig: seven XL330-M077 with spools of 1 cm.
+# A finger on the shipped rig: seven XL330-M077 servos with spools of 1 cm radius.
 _REAL_LIKE: Final = Gap(
     # A chosen value; the two sets of moment arms in `anatomy` differ by 40 % in the median.
     arm_error=0.2,
-    # The stiffness of four healthy people's knuckles was 0.7 to 1.2 of the nominal one
+    # The stiffness of four healthy people's knuckles was 0.8 to 1.2 of the nominal one
     # (PMC7775510, table 2). The range is chosen around these values.
     joint_factor=(0.7, 1.4),
     # The rig pulls with 1 to 15 N; the nominal finger with up to 25 N.
@@ -154,7 +154,7 @@ _REAL_LIKE: Final = Gap(
 GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
     {
         "real-like": _REAL_LIKE,
-        # Ranges for training robust policies, chosen slightly wider than in "real-like".
+        # Ranges for training robust policies, most of them chosen wider than in "real-like".
         "wide": msgspec.structs.replace(
             _REAL_LIKE,
             arm_error=0.25,
@@ -195,8 +195,8 @@ def shipped_rig() -> FingerParameters:
 def geared_around(found: FingerParameters) -> Gap:
     """Return the gap of a finger on geared servos after identification.
 
-    Arms, joints, stretch and delay are drawn within the errors of the identification. A log
-    hardly reveals parameters of the motors, so they keep their ranges in "wide".
+    Arms, joints, stretch and delay are drawn within the errors of the identification. A log hardly
+    reveals mass, damping, friction, lag and backlash, so they keep their ranges in "wide".
     """
     late = found.command_delay + _DELAY_FOUND_S
     stiffness = found.tendon_stiffness or GAPS["wide"].tendon_stiffness[1]

@@ -42,7 +42,7 @@ _SENSES: Final = 2
 
 
 class DeviceFinger(Worlds):
-    """Batch of fingers with any parameters and a target each; `plant` is the first finger."""
+    """Batch of fingers, each with its own parameters and target; `plant` is the first finger."""
 
     precision = torch.float64
 
@@ -51,7 +51,7 @@ class DeviceFinger(Worlds):
         self._gives, self._held = parameters.gives, plant.held
         self._noisy = parameters.joint_noise > 0.0, parameters.tension_noise > 0.0
         super().__init__(env, model, *args, **kwargs)
-        # Indices of the former controls in MuJoCo's history, after two settings and the times.
+        # Indices of former controls in MuJoCo's history, which begins with two settings and times.
         samples = int(model.actuator_history[0, 0])
         first = np.asarray(model.actuator_historyadr) + 2 + samples
         self._former = torch.as_tensor(
@@ -66,7 +66,7 @@ class DeviceFinger(Worlds):
         whole = partial(torch.zeros, self.count, dtype=torch.int64, device=self.device)
         count = self.count
         self._commands, self._change = zeros(count, _T), zeros(count, _T)
-        self._shares = zeros(count, _T)  # Tensions on the command path, 0 to 1.
+        self._shares = zeros(count, _T)  # Tensions on the command path, 0 to 1 of their range.
         self._angles, self._velocities = zeros(count, _J), zeros(count, _J)
         self._senses = zeros(count, 2 * _J + 3 * _T)
         self._seen_tip, self._tip, self._target = zeros(count, 3), zeros(count, 3), zeros(count, 3)
@@ -320,7 +320,7 @@ def _fingertip(angles: Tensor) -> Tensor:
     return torch.stack(tip_at(cos, sin), dim=1)
 
 
-# Relative distance to a whole number of steps below which rounding can add one to a delay.
+# Relative distance to a whole number of steps below which rounding can add a step to a delay.
 _WHOLE: Final = 1e-6
 
 
@@ -328,7 +328,7 @@ class FingerReader(BodyReader):
     """Compiles fingers for a CPU env's task, and extracts the numbers that a device needs.
 
     Raises:
-        VectorEnvError: If the env has goals, or draws another finger at each reset.
+        VectorEnvError: If the env has goals, or draws another path or finger at each reset.
     """
 
     def __init__(self, env: gym.Env[Any, Any], *_: Any) -> None:
@@ -346,7 +346,7 @@ class FingerReader(BodyReader):
         if individual:
             raise VectorEnvError(
                 f"backend='warp' needs a {individual} with a gap, because its resets draw no "
-                "fingers: pass drawn fingers as bodies=[...] and options={'bodies': [...]}."
+                "fingers. For other fingers, pass bodies=[...] and options={'bodies': [...]}."
             )
 
     @override
@@ -359,7 +359,7 @@ class FingerReader(BodyReader):
         """Return a compiled finger, and a function that makes a batch with it as the first finger.
 
         Raises:
-            VectorEnvError: If the command delay is a whole number of simulation steps.
+            VectorEnvError: If the command delay is a whole number of simulation steps above 0.
             FingerError: If the command path does not fit the simulation steps.
         """
         env = self._env

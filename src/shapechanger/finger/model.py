@@ -220,7 +220,7 @@ def _add_tendon(
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
     )
     motor.dynprm[0] = parameters.motor_lag
-    # Travel of a motor shortens its tendon, so length and speed have opposite signs.
+    # A pull is negative at a tendon, and positive at a motor, whose travel shortens the tendon.
     rest = 1.0 - drive.muscle_stiffness * drive.rest[i]
     muscle = np.array([sign * rest, -drive.muscle_stiffness, -drive.muscle_damping])
     motor.gainprm[:3] = drive.gain[i] * muscle
@@ -313,7 +313,7 @@ _EXACT: Final[Mapping[str, Mapping[str, str]]] = {
 
 
 def finger_mjcf(parameters: FingerParameters, drive: TendonDrive) -> str:
-    """Return the MJCF of a finger with its anatomy and parameters, and its limits as a comment.
+    """Return the MJCF of a finger with its anatomy; a comment lists what it does not simulate.
 
     Controls are the commands of the drive, or tensions if the parameters have a command path.
     """

@@ -103,7 +103,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
     Raises:
         FingerError: If a number is not finite or has the wrong sign, an array has the wrong shape,
-            or a backlash is given without a stiffness.
+            a backlash has no stiffness, or `most_tension` is not above `least_tension`.
         UnknownName: If the name of a path's value is unknown.
     """
 
@@ -198,7 +198,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
 
 NOMINAL: Final = FingerParameters()
-"""Finger with the values of `anatomy` and stiff tendons, without friction, delay or noise."""
+"""Finger with the values of `anatomy`, stiff tendons without friction, and no delay or noise."""
 
 PARAMETER_SETS: Final[Mapping[str, FingerParameters]] = MappingProxyType(
     {"an-1983": NOMINAL.replace(moment_arms=AN_1983_ARMS)}

@@ -1,7 +1,7 @@
 """Paths that a fingertip follows: shapes, functions of time, and recorded tables.
 
 Positions are in the finger's frame: x distal, y radial, z dorsal, in metres from the knuckle (the
-MCP joint). Times are in seconds. The env checks whether a finger reaches a path.
+MCP joint). Times are in s. `FingerTrack-v1` refuses paths that the nominal finger cannot follow.
 
 >>> from shapechanger.finger.paths import as_path
 >>> path = as_path({"kind": "circle", "radius": 0.01, "hz": 1.0})
@@ -80,7 +80,7 @@ class FingertipPath:
 
 
 FASTEST_MPS: Final = 2.0
-"""Speed limit of paths, m/s: 20 rad/s at 0.1 m. A faster path has a jump or wrong units."""
+"""Speed limit of paths, m/s: 20 rad/s at 0.1 m. A faster path likely has a jump or wrong units."""
 
 
 def _require_slow(where: str, first: Array, last: Array, seconds: float) -> None:
@@ -134,8 +134,8 @@ def circle(
 ) -> FingertipPath:
     """Return a circle at constant speed.
 
-    The path begins on its distal side, or on its dorsal side if `normal` points along x. It turns
-    around `normal` by the right-hand rule, so by default it first moves towards the palm.
+    With `phase` 0 the path begins on its distal side, or on its dorsal side if `normal` points
+    along x. It turns around `normal` by the right-hand rule: by default first towards the palm.
 
     Args:
         radius: Radius, m, above 0.
@@ -162,8 +162,8 @@ def figure_eight(
 ) -> FingertipPath:
     """Return a horizontal figure eight: a lemniscate of Gerono, flat or bent.
 
-    The path begins at its crossing, towards the distal loop. Seen against `normal`, it runs
-    clockwise around the distal loop and counter-clockwise around the other loop.
+    With `phase` 0 it begins at its crossing, towards the distal loop. Seen against `normal`, it
+    runs clockwise around the distal loop and counter-clockwise around the other loop.
 
     Args:
         size: Length along x, or along the direction of the plane nearest to x, m, above 0. The
@@ -322,7 +322,7 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
         PathError: If the file cannot be read, has missing, unknown or repeated columns, or fewer
             than three rows; if a cell is not a finite number; if time does not increase; if a time
             step is more than five times the median; or if the point is faster than `FASTEST_MPS`.
-            The message names the line.
+            A message about a row names its line.
     """
     name = os.fspath(path)
     try:

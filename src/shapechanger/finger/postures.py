@@ -16,14 +16,14 @@ from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.task import fingertip, fingertip_jacobian
 from shapechanger.finger.tensions import drive_of
 
-# Distance of a joint from either end, as a fraction of its range.
+# Smallest distance of a drawn angle from either end, as a fraction of the range of its joint.
 _MARGIN: Final = 0.1
 # Share of the abduction range that is left at full flexion, chosen small.
 _SPREAD_LEFT: Final = 0.3
-# Friction changes its sign smoothly around this speed, rad/s.
+# Scale of the speed, rad/s, over which friction changes its sign smoothly.
 _STICKS_BELOW: Final = 0.1
 START_SPREAD: Final = 0.1
-"""Largest distance of starts from the rest posture, rad."""
+"""Largest distance of a joint from its rest angle at the start, rad."""
 # Each thread reuses its own MjData, because envs run in threads and creating MjData is slow.
 _own: Final = threading.local()
 
@@ -40,7 +40,7 @@ def coupled(flexion: Any, abduction: Any, middle: Any, off: Any) -> tuple[Any, A
     """Return joint angles, rad, arrays or tensors, that the tissue of a finger allows.
 
     `abduction` is the abduction of a straight knuckle; flexion reduces it. `off` is the difference
-    of the end joint from its coupled angle. The nominal finger can hold all angles within
+    of the end joint from its coupled angle. The nominal finger can hold the result if it is within
     `inner_range`.
     """
     share = 1.0 - (1.0 - _SPREAD_LEFT) * flexion.clip(0.0) / float(JOINT_RANGE[0, 1])
@@ -85,7 +85,7 @@ def joint_torque(
 
 
 def inner_range() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lowest and highest angles of starts and targets, rad, (4,) each."""
+    """Return the lowest and highest angles of drawn starts and targets, rad, (4,) each."""
     low, high = JOINT_RANGE.T
     inner = _MARGIN * (high - low)
     return low + inner, high - inner
@@ -109,7 +109,7 @@ _MOST_STEP_RAD: Final = 0.5
 # Factors by which the damping grows after a worse step, and falls after a better one.
 _GROWS: Final = 4.0
 _FALLS: Final = 16.0
-# Error, m, above which the search is repeated from hyperextended, half and fully flexed.
+# Error, m, above which the search is repeated from a hyperextended, half flexed and flexed finger.
 _FAR_M: Final = 1e-5
 _STARTS: Final = tuple(
     np.array([low + share * (high - low), 0.0, *(share * JOINT_RANGE[2:, 1])])

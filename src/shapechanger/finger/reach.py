@@ -28,7 +28,7 @@ class FingerReachEnv(FingerEnv):
 
     The finger has four joints, and seven tendons that only pull: flexors, extensors and the small
     muscles of the hand; `shapechanger.finger.anatomy` has its numbers and their sources. Tendons
-    pull several joints at once, so a posture needs most of them together.
+    pull several joints at once, so a posture needs most tendons together.
 
     ## Action space
     `Box(-1, 1, (7,), float32)`, one command per tendon, which lasts 0.02 s. The argument `actions`
@@ -95,8 +95,8 @@ class FingerReachEnv(FingerEnv):
 
     ## Start
     At rest, within 0.1 rad of the posture of a hand at rest, all tendons just taut. The target is
-    the fingertip of a random posture that the nominal finger can hold, at least a tenth of its
-    range away from each limit. A weaker finger of a gap may not reach all targets.
+    the fingertip of a random posture that the nominal finger can hold, each joint at least a tenth
+    of its range away from its limits. A weaker finger of a gap may not reach all targets.
 
     ## End
     Never terminated. Truncated after 100 steps, 2 s.
@@ -154,7 +154,7 @@ class FingerReachEnv(FingerEnv):
 
         Raises:
             UnknownName: If the name of an option is unknown.
-            FingerError: If a posture or a target is malformed or out of range.
+            FingerError: If a posture is malformed or out of range, or a target is malformed.
         """
         super().reset(seed=seed)
         given = (options or {}).get("target")

@@ -66,7 +66,8 @@ class RigMixin(FingerEnv):
             `reset_timeout_s` of `RemoteVehicleEnv`.
 
     Raises:
-        UnknownName: If the name of the rig, mode of action or weight is unknown.
+        UnknownName: If the name of the rig, twin, mode of action or weight is unknown.
+        FingerError: If `finger_seed` is given without a gap, or the mode does not suit the rig.
         LinkError: If the rig cannot be reached, or is not trusted.
         RobotRefused: If the rig refuses the connection, or is not a finger rig.
     """
@@ -132,7 +133,7 @@ class RigMixin(FingerEnv):
 
         Raises:
             UnknownName: If the name of an option is unknown.
-            FingerError: If a posture or a target is malformed or out of range.
+            FingerError: If a posture is malformed or out of range, or a target is malformed.
             PathError: If a path is invalid, or the finger cannot follow it.
             RobotRefused: If the rig was not armed in time, refuses the connection, or stops on the
                 way to the start, or if the lengths of its tendons fit no posture.
@@ -168,7 +169,7 @@ class RigMixin(FingerEnv):
 
     @property
     def individual(self) -> str:
-        """Name of the argument that selects a finger of a gap, or "" if there is only one."""
+        """The argument that selects a finger of the gap, or "" if there is only one finger."""
         many = bool(self._twin) and self._twin != NOMINAL_TWIN
         return "finger_seed" if many and self._finger_seed is None else ""
 
@@ -238,7 +239,7 @@ class RigMixin(FingerEnv):
         return senses
 
     def _sense(self, state: NDArray[Any]) -> FingerSenses:
-        """Read a state of the rig, and show it, or the true state of its twin, in the plant."""
+        """Read a state of the rig, and show it, or the true state of the own twin, in the plant."""
         senses = self._rig_senses.read(state, self._rig_info["absent"], self._command)
         if self._operator is not None:
             truth = self._operator.where().truth
@@ -285,7 +286,7 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     ## Start
     The operator arms a rig; the env arms a twin. For up to 1 s, the env moves the finger to the
     start of `Finger-v1` for the same seed. The measured error is a few hundredths of a radian, or
-    more if gears stick. The target is the same as there. Servos of the env's own twin are cool at
+    more if gears stick. The target is as in `Finger-v1`. Servos of the env's own twin are cool at
     the start; servos of a rig need pauses, or they get hot and switch off.
 
     ## End

@@ -30,7 +30,7 @@ _SHOWN: Final = {
     "1": ("of nominal", 1.0),
 }
 # Widest interval that counts as bounded, in SI units. It is the thickness of a finger for arms, and
-# about twice the range of the gap "wide" for the other parameters.
+# more than twice the range of the gap "wide" for the other parameters.
 _WIDEST: Final = {
     "moment_arms": 0.015,
     "tendon_friction": 3.0,
@@ -115,8 +115,8 @@ def unbounded(estimate: ParameterEstimate) -> str:
     if estimate.high - estimate.low <= widest:
         return ""
     return (
-        f"every value from {low} to {high} {unit} fits, a wider range than the "
-        f"{factor * widest:.3g} {unit} by which fingers differ."
+        f"every value from {low} to {high} {unit} fits; a range wider than "
+        f"{factor * widest:.3g} {unit} counts as unknown."
     )
 
 

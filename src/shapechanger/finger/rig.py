@@ -15,7 +15,7 @@ from shapechanger.finger.task import FingerSenses, fingertip
 from shapechanger.finger.tensions import tensions_for_torque
 from shapechanger.layout import Layout
 
-# Length error, m, above which a servo must have lost a turn (30 mm on a small spool).
+# Length error, m, above which lengths fit no posture; a lost turn is 30 mm on a small spool.
 _MISFIT_M: Final = 0.012
 _COMPLIANCE: Final = 1.0 / 20e3  # Assumed compliance of the cables, m/N, as on a twin.
 _ABOVE_REST: Final = 1e-3  # Smallest command of a length, because 0 is the pretension.
@@ -30,7 +30,7 @@ class RigSenses:
     seven lengths by least squares, with corrections for stretch, the nominal moment arms and the
     ranges of the joints, and velocities are computed from the speeds of the tendons. `least` and
     `most` are the tensions at the commands 0 and 1, N, (7,). If the rig `controls_length`, commands
-    are lengths, at tensions of at most `most`.
+    are lengths, at tensions of at most `most`, and `least` is `LEAST_TENSION_N`.
     """
 
     def __init__(self, robot: str, action_layout: Layout, state_layout: Layout) -> None:
@@ -135,7 +135,7 @@ _GEARED_KG: Final = 1.44
 # Friction of the gears, N, and the tendon speed below which it is compensated partly, m/s.
 _GEAR_FRICTION_N: Final = 0.55
 _CREEP_M_PER_S: Final = 0.004
-# Integral gain, N·m/rad, which corrects differences in friction and arms; and limit of lags, rad/s.
+# Integral gain, N·m/rad, for differences in friction and arms, and speed error limit, rad/s.
 _MORE_NM: Final = 0.08
 _MOST_LAG: Final = 0.8
 

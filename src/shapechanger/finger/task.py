@@ -63,7 +63,7 @@ def fingertip_jacobian(angles: ArrayLike) -> NDArray[np.float64]:
     flexion, abduction, middle, both = bent
     along, down = _in_plane([np.cos(a) for a in bent], [np.sin(a) for a in bent])
     zero = np.zeros_like(flexion)
-    # (d along, d down) by each angle, and the part that abduction turns sideways.
+    # Derivatives of `along` and `down` by the angles of the end and middle joints.
     end_along, end_down = -PHALANX_LENGTH_M[2] * np.sin(both), PHALANX_LENGTH_M[2] * np.cos(both)
     middle_along = end_along - PHALANX_LENGTH_M[1] * np.sin(middle)
     middle_down = end_down + PHALANX_LENGTH_M[1] * np.cos(middle)

@@ -28,7 +28,7 @@ from shapechanger.finger.parameters import FingerParameters
 # as on the ascending limb of the force-length curve. The damping is chosen.
 _MUSCLE_STIFFNESS: Final = 25.0
 _MUSCLE_DAMPING: Final = 1.0
-# Smallest strength of a shortened muscle for which a command is computed.
+# Lower limit of the strength of a shortened muscle when a command is computed.
 _WEAKEST: Final = 0.05
 # Chosen gains of a servo that holds its spool: 20 N per centimetre, nearly its largest force.
 _SERVO_STIFFNESS: Final = 2000.0
@@ -44,7 +44,7 @@ class TendonDrive:
     relative to the straight finger. The arrays may be tensors.
     """
 
-    offset: NDArray[np.float64]  # Tension at rest, N, (7,).
+    offset: NDArray[np.float64]  # Tension of the command 0 at the length `rest`, N, (7,).
     gain: NDArray[np.float64]  # Tension per command, N, (7,), > 0.
     stiffness: float = 0.0  # N/m.
     damping: float = 0.0  # N·s/m.
@@ -94,7 +94,7 @@ DRIVES: Final[Mapping[str, str]] = MappingProxyType(
 
 
 def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
-    """Return the drive of a mode of action, with the finger's range of tensions.
+    """Return the drive of a mode of action, from `LEAST_TENSION_N` to a finger's largest tensions.
 
     A drive is part of the controller, so it assumes the nominal moment arms.
     """
@@ -115,7 +115,7 @@ def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
     return TendonDrive(LEAST_TENSION_N + half, half, 0.0, 0.0, *muscle, rest)
 
 
-# Tolerance of a torque, N·m: a hundredth of the torque of a fingertip of 4 g about its joint.
+# Tolerance of a torque, N·m; the weight of a fingertip, 3 g, turns its joint with 300 times more.
 _TOLERANCE_NM: Final = 1e-6
 _LITTLE: Final = 1e-3
 # Smallest distance between bounds that the solver accepts, N.
@@ -130,7 +130,7 @@ def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
     all tensions of a solution positive.
     """
     r = np.asarray(arms, np.float64)
-    # With this scale the solver's tolerance is a millionth of a typical arm.
+    # The solver's tolerance is absolute, so the largest arm is scaled to 1.
     scale = np.abs(r).max()
     if not scale > 0.0:
         return None

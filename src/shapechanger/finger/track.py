@@ -22,14 +22,14 @@ from shapechanger.finger.visuals import polyline
 from shapechanger.layout import Element, Feature, Layout
 
 _CHECK_HZ: Final = 50.0
-# Duration for which an endless path is checked, s.
+# Longest duration for which a path is checked, s.
 _LOOK_S: Final = 60.0
 # Largest error of a reachable point, m: a sixth of the tolerance of the task.
 _OFF_M: Final = 0.0005
 
 
 def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
-    """Require that the nominal finger can follow a path, and return its first angles, rad, (4,).
+    """Return a path's first angles, rad, (4,), if the nominal finger can follow its first 60 s.
 
     Raises:
         PathError: If a point is out of reach, or the tendons are too weak for the motion; the
@@ -81,7 +81,7 @@ def _weakness(times: NDArray[np.float64], angles: NDArray[np.float64]) -> tuple[
     return 0.0, 0.0
 
 
-# Ranges of random paths: radius, m, and speed, m/s.
+# Ranges of random paths: size (radius, half a line, length of an eight), m, and speed, m/s.
 _SIZE: Final = (0.003, 0.015)
 _SPEED: Final = (0.01, 0.08)
 _SLOWEST_HZ: Final = 0.1
@@ -123,7 +123,7 @@ SETTLING_STEPS: Final = 25
 """Steps at the start that do not count for the error, 0.5 s: the fingertip has to gain speed."""
 FOLLOWS_M: Final = 0.003
 """Largest root mean square of the error of a finger that follows its path, m."""
-# Frames show this duration of an endless path, s, and a trail of one second.
+# Frames show at most this duration of a path, s, and a trail of one second.
 _DRAWN_S: Final = 5.0
 _DRAWN_POINTS: Final = 97
 _TRAIL_STEPS: Final = 50
@@ -165,9 +165,9 @@ class FingerTrackEnv(FingerEnv):
 
     ## Info
     `distance`, m, of the true fingertip from the point; `rms`, m, the root mean square of the
-    distance from 0.5 s after the start; `is_success`, whether `rms` is below 3 mm; `target`, m;
-    `smoothness`, `reward_nearness`, `reward_effort` and `reward_change`; `diverged` if the
-    simulation diverged.
+    distance from 0.5 s after the start, and infinite before; `is_success`, whether `rms` is below
+    3 mm; `target`, m; `smoothness`, `reward_nearness`, `reward_effort` and `reward_change`;
+    `diverged` if the simulation diverged.
 
     ## Versions
     v1: the first.

@@ -32,7 +32,7 @@ def rig_place(profile: Profile, gap: str = "", seed: int | None = None) -> Place
     """Return the place of a rig with the tendons of a finger; None for other robots.
 
     The finger is drawn from the named reality gap, by default with seed 0. Without a gap, it is the
-    nominal finger.
+    nominal finger. For another robot with a gap, a `RobotError` is raised.
     """
     tendons = {output.name for output in profile.outputs if output.driver == "bus_servo"}
     if tendons == set(TENDONS):
@@ -54,7 +54,7 @@ def finger_place(parameters: FingerParameters) -> Place:
 def open_finger(
     parts: Collection[str], camera: CameraPlan | None, seed: int, *, parameters: str
 ) -> FingerWorld:
-    """Open the world of a finger with these parameters, JSON; it has no sensors and no camera."""
+    """Open the world of a finger with these parameters, JSON; `parts` and `camera` are unused."""
     del parts, camera
     return FingerWorld(FingerParameters.from_json(parameters), seed)
 
@@ -62,9 +62,9 @@ def open_finger(
 class FingerWorld(World):
     """Bones and joints of a finger, without surroundings; see `World` and `TendonWorld`.
 
-    The twin simulates servos with motors, spools, gears, cables and friction. Friction, mass, lag
-    and delay of the parameters are therefore not simulated here. Readings of angles have the joint
-    noise of the parameters.
+    The twin simulates servos with motors, spools, gears, cables and friction. Friction of tendons,
+    mass, lag and delay of motors are therefore not simulated here. Readings of angles have the
+    joint noise of the parameters.
     """
 
     def __init__(self, parameters: FingerParameters, seed: int) -> None:

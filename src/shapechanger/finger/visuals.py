@@ -1,7 +1,7 @@
 """Visuals of the finger: bones, skin and tendons, and a legend, paths and trails in frames.
 
-Bones, skin and visible tendons have no mass, collisions or forces. The fixed tendons of
-`shapechanger.finger.model` move the finger.
+What this module adds has no mass, collisions or forces. The phalanges of
+`shapechanger.finger.model`, coloured as skin, have the mass, and its fixed tendons move them.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ TENDON_COLOURS: Final = {
 """Red, green and blue of each tendon, 0 to 1."""
 
 THINNEST_M: Final = 0.0007
-"""Radius of a tendon without tension, m, chosen like all sizes and colours in this file."""
+"""Radius of a tendon without tension, m, chosen like the other sizes in this file."""
 THICKEST_M: Final = 0.0016
 """Radius of a tendon at its largest tension, m."""
 
@@ -247,7 +247,7 @@ def _add_course(
         tendon.wrap_site(site.name)
 
 
-# Width of the narrowest frame with a legend, pixels. The names would be illegible in others.
+# Width of the narrowest frame with a legend, pixels. In narrower ones, names would be illegible.
 _NARROWEST: Final = 240
 _SMALLEST_FONT: Final = 9.0
 # Height of the font, divided by the height of the frame. The legend stays above a raised finger.
@@ -257,7 +257,7 @@ _EMPTY: Final = (205, 210, 218)
 
 
 def tendon_legend(frame: NDArray[np.uint8], pulled: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return a frame with each tendon's name, colour and tension along its top.
+    """Return a frame with each tendon's name, colour and tension on top, if it is wide enough.
 
     `pulled` has the length of each tendon's bar: its tension divided by its largest, 0 to 1, (7,).
     """

@@ -33,7 +33,7 @@ from tests.finger.identify.logs import changed, kinematics, made_up, recorded, s
 
 @functools.cache
 def short() -> tuple[FingerLog, FingerParameters]:
-    """Return a log of two windows of a stiff, lightly damped finger with friction."""
+    """Return a log of two windows of a stiff, lightly damped finger, and its parameters."""
     parameters = NOMINAL.replace(
         joint_stiffness=tuple(1.3 * v for v in NOMINAL.joint_stiffness),
         joint_damping=tuple(0.8 * v for v in NOMINAL.joint_damping),
@@ -66,7 +66,7 @@ def test_joints_and_friction_are_found() -> None:
 
 
 def test_windows_begin_in_the_measured_state() -> None:
-    """Windows last 1 s from 0.3 s on, and start with measured velocities and activations."""
+    """Windows last 1 s from 0.3 s on, and start with the log's velocities and activations."""
     log, _ = short()
     dt = log.control_dt
     windows = cut_windows(log, exact(), motors())
@@ -129,7 +129,7 @@ def test_motors_follow_with_their_lag() -> None:
 
 
 def test_strength_needs_saturation() -> None:
-    """Without saturation, the assumed strength is returned."""
+    """Without saturation, the strength is 1, even for a finger that is three times as strong."""
     strong = tuple(3.0 * tension for tension in NOMINAL.most_tension)
     log, _ = recorded(3.0, actions="tension", parameters=NOMINAL.replace(most_tension=strong))
     found = fit_motors(changed(log, motors=None))

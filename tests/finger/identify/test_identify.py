@@ -63,7 +63,7 @@ def test_a_finger_is_identified() -> None:
 
 
 def test_intervals_contain_the_truth() -> None:
-    """Intervals contain the true values, and intervals of the arms exclude the nominal arms."""
+    """Intervals of joints and friction contain the truth; intervals of arms exclude the nominal."""
     _, truth, found, _ = quick()
     by_name = {e.name: e for e in found.estimates}
     for j, joint in enumerate(JOINTS):
@@ -97,9 +97,9 @@ def estimates(
 
 
 def test_intervals_follow_from_standard_errors() -> None:
-    """Half widths are the quantile times the standard errors, which include model errors."""
+    """Half widths are a quantile times the standard errors, most of which include model errors."""
     found, reach = estimates(), interval_quantile(300, 0.02)
-    # On a rig, tensions reveal friction, and the gears increase errors of arms.
+    # On a rig, the model error of friction is smaller, and arms have a model error too.
     rig = estimates(rig=NOMINAL.replace(path=CommandPath()))
     arm = "moment_arms/FDP/MCP_flexion"
     for e, error in (
@@ -152,7 +152,7 @@ def test_stiffness_has_the_interval_of_its_inverse() -> None:
 
 
 def test_fitted_values_become_parameters() -> None:
-    """Joints, friction, motors and noise are fitted; other parameters stay nominal."""
+    """Joints, tendon friction, lag, delay and noise are fitted; joint friction stays nominal."""
     found = result._parameters(kinematics(0.0, 1e-6, 0.02), MOTORS, DYNAMICS, None)
     assert found.moment_arms == NOMINAL.moment_arms
     assert found.joint_stiffness == tuple(2.0 * v for v in NOMINAL.joint_stiffness)
@@ -179,7 +179,7 @@ def test_undetermined_parameters_are_listed() -> None:
 
 @pytest.mark.parametrize("stiffness", [None, 2e4])
 def test_replay_of_the_true_finger_repeats_the_motion(stiffness: float | None) -> None:
-    """A replay of one second stays within a degree, with stiff and with elastic tendons."""
+    """A replay of one second is off by less than a degree RMS, with stiff and elastic tendons."""
     true = NOMINAL.replace(tendon_stiffness=stiffness, command_delay=0.02)
     log, _ = recorded(2.0, parameters=true)
     motors = Motors(true.motor_lag, true.command_delay, 1.0, (0.0, 0.0, 0.0), False, 0.0)
@@ -192,13 +192,13 @@ def test_replay_of_the_true_finger_repeats_the_motion(stiffness: float | None) -
 
 
 def test_unbounded_intervals_are_unknown() -> None:
-    """An infinite interval, or one wider than the range of fingers, is shown as "unknown"."""
+    """An interval that is infinite, or wider than its limit, is shown as "unknown"."""
     found, stretch = estimates(1e-5, 1e-5), "tendon_stiffness"
     stiffness, arm = found["joint_stiffness/PIP_flexion"], found["moment_arms/FDP/MCP_flexion"]
     for e, why in (
         (found[stretch], "above 31.1 N/mm"),
         (estimates(-1e-4, 1e-6)[stretch], "no stretch"),
-        (found["tendon_friction"], "the 3 N by which fingers differ"),
+        (found["tendon_friction"], "wider than 3 N counts as unknown"),
         (dataclasses.replace(stiffness, high=1.0), "60 mN·m/rad"),
     ):
         assert report.interval(e) == "unknown"
@@ -231,8 +231,8 @@ def test_a_noisy_finger_is_identified() -> None:
         assert np.isfinite(observation).all()
 
 
-def test_a_delay_on_a_path_follows_from_the_motion() -> None:
-    """The log contains the motors of the rig; tensions do not show delays below a period."""
+def test_a_delay_below_a_period_is_identified() -> None:
+    """Only the motion shows this delay of a rig, whose motors and command path are in the log."""
     path = CommandPath(slew_per_s=20.0, slew_down_per_s=20.0)
     drawn = with_gears(GAPS["real-like"].draw(np.random.default_rng(1)))
     late = drawn.replace(path=path, command_delay=0.008, joint_noise=0.0)

@@ -5,8 +5,8 @@ The length that a motor has wound up depends on the joint angles and on the tend
     length = zero - arms · angles - (tension + friction + damping) / stiffness.
 
 Angles are noisy and lengths nearly exact, so a plain regression of lengths on angles would
-underestimate the arms. Here residuals are weighted, at each time, by their covariance
-`V = R S R' + D` with the moment arms R, the variances S of the angles and D of the lengths. The
+underestimate the arms. Here residuals are weighted, at each time, by the inverse of the covariance
+`V = R S R' + D`, with the moment arms R, the variances S of the angles and D of the lengths. The
 estimated arms maximize the likelihood (the structural relation of Fuller 1987, "Measurement error
 models", section 2.3). The search starts from a regression on the part of the angles that the other
 tendons' lengths explain (instrumental variables).
@@ -141,7 +141,7 @@ class _Regression:
         return cls(*(column[first:] for column in columns))
 
     def joint_noise(self) -> NDArray[np.float64]:
-        """Standard deviation of each angle given all other columns, rad, (4,)."""
+        """Standard deviation of each angle given lengths, tensions and speeds, rad, (4,)."""
         known = np.column_stack([self._forces(), self.lengths, np.ones(len(self.lengths))])
         left: Any = self.angles - known @ np.linalg.lstsq(known, self.angles)[0]
         freedom = max(1, len(known) - known.shape[1])

@@ -37,7 +37,7 @@ _SETTINGS: Final = ("actions", "control_dt", "source", "motors")
 
 # Longest time between two rows, in control periods. It allows jitter, but no missing row.
 _LONGEST_STEP: Final = 1.5
-_MAX_BYTES: Final = 256 << 20  # An hour at 50 Hz has about 30 MB.
+_MAX_BYTES: Final = 256 << 20  # An hour at 50 Hz has 37 MB.
 # Shortest log, s. The intervals need several periods of half a second.
 _SHORTEST_S: Final = 4.0
 # Smallest range of each joint, rad, from the 5th to the 95th percentile. Over this range, a tendon
@@ -65,8 +65,8 @@ class FingerLog:
             hardly identifies geared motors; None if they are unknown.
 
     Raises:
-        FingerError: If the arrays differ in length or contain a number that is not finite, or the
-            times do not increase or have gaps.
+        FingerError: If `control_dt` is not above 0 and finite, the arrays differ in length or
+            contain a number that is not finite, or the times do not increase or have gaps.
         UnknownName: If `actions` is not a known mode.
     """
 
@@ -95,7 +95,7 @@ class FingerLog:
         if (wrong := ~((steps > 0.0) & (steps <= _LONGEST_STEP * self.control_dt))).any():
             row = int(wrong.argmax())
             raise FingerError(
-                f"Time runs backwards or has a gap in row {row + 1} of the log: rows are due every "
+                f"Time repeats, runs backwards or has a gap in row {row + 1}: rows are due every "
                 f"{1e3 * self.control_dt:g} ms, and {self.t[row + 1]:.3f} s comes after "
                 f"{self.t[row]:.3f} s."
             )
@@ -174,8 +174,8 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
     """Read a log written by `save_log`.
 
     Raises:
-        FingerError: If the file is not a log, is damaged or has a later version, or if `FingerLog`
-            rejects the log.
+        FingerError: If the file cannot be read, is not a log, is damaged or has a later version, or
+            if `FingerLog` rejects the log.
         UnknownName: If the mode of action of the log is unknown.
     """
     place = Path(path)
@@ -198,8 +198,8 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
         *(zipfile.BadZipFile, zlib.error, msgspec.MsgspecError),
     ) as error:
         raise FingerError(
-            f"{place.name} is damaged, or not a finger log; `shapechanger finger record` writes "
-            f"one: {str(error).rstrip('.')}."
+            f"{place.name} is damaged, or not a finger log: {str(error).rstrip('.')}. Record one "
+            "with `shapechanger finger record`."
         ) from error
     return FingerLog(**arrays, **{key: getattr(header, key) for key in _SETTINGS})
 

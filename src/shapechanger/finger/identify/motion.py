@@ -2,8 +2,8 @@
 
 Lag, delay and strength of the motors are fitted first. Then `mujoco.sysid` simulates the finger
 under the log's commands, one second at a time, and fits parameters until the simulated angles match
-the measured ones. The simulated tendons do not stretch, which allows a longer time step. The
-simulated motors have the fitted lag and delay.
+the measured ones. The simulated tendons do not stretch, which allows a longer time step. The motors
+have the fitted lag and delay or, in a log with a command path, pull with the measured tensions.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ _FORGETS_S: Final = 0.3
 _LONGEST_DELAY_S: Final = 0.15
 _LAGS_S: Final = (0.002, 0.2)
 _STRENGTHS: Final = (0.3, 2.0)
-# Delays to start from: the cost has local minima one control period apart.
+# The fit starts from the best of these delays: its cost has minima one control period apart.
 _INITIAL_DELAYS_S: Final = (0.005, 0.03, 0.06, 0.1)
 _LEAST_NOISE_N: Final = 1e-4
 # Relative step of finite differences, large because clipping makes the residual not smooth.
 _MOTOR_STEP: Final = 1e-3
-# Share of the rows with a saturated tendon from which the strength can be estimated.
+# Smallest share of rows with a saturated tendon that allows the strength to be estimated.
 _SATURATED: Final = 0.01
 
 
 class CommandSignal:
-    """The commands of a log as functions of time; the first command also acts before the log."""
+    """Commands of a log as functions of time; the first also acts in the second before the log."""
 
     def __init__(self, log: FingerLog) -> None:
         self._t = np.concatenate([[log.t[0] - 1.0], log.t])
@@ -61,7 +61,7 @@ class CommandSignal:
         )
 
     def delayed(self, start: float, dt: float, steps: int, delay: float) -> NDArray[np.float64]:
-        """Mean command over each time step, (steps, 7), a smooth function of the delay, s."""
+        """Mean command over each time step, (steps, 7), a continuous function of the delay, s."""
         edges = start + dt * np.arange(steps + 1) - delay
         sums = np.empty((steps + 1, self._sums.shape[1]))
         for i, column in enumerate(self._sums.T):
@@ -90,7 +90,7 @@ class Motors:
     delay: float  # Delay of the commands, s.
     strength: float  # Largest tensions, divided by the tensions assumed in the fit.
     sd: tuple[float, float, float]  # Standard errors of `lag`, `delay` and `strength`.
-    saturates: bool  # Whether a tendon reached its largest tension; otherwise the strength is 1.
+    saturates: bool  # Whether tendons saturate often enough; otherwise the strength is 1.
     tension_noise: float  # Standard deviation of measured tensions, N.
 
 
@@ -230,7 +230,7 @@ def steps_per_period(control_dt: float, timestep: float) -> int:
 
 
 def with_motors(motors: Motors, known: FingerParameters | None) -> FingerParameters:
-    """The nominal finger with the fitted lag and the motors `known`, or fitted motors for None."""
+    """The nominal finger with the fitted lag, and the motors `known`; for None, estimated ones."""
     nominal = NOMINAL.replace(motor_lag=motors.lag)
     if known is None:
         most = motors.strength * np.array(NOMINAL.most_tension)
@@ -336,7 +336,7 @@ class _MotionFit:
         x = parameters.as_vector()
         values = np.array(list(FACTORS.values())) * np.exp(x)
         model = copy.copy(self._model)
-        # The stiffness at the ends of the ranges keeps its ratio.
+        # The stiffness at the ends of the ranges changes in proportion.
         model.jnt_stiffnesspoly[:_N] *= (values[:_N] / model.jnt_stiffness[:_N])[:, None]
         model.jnt_stiffness[:_N] = values[:_N]
         model.dof_damping[:_N] = values[_N : 2 * _N]

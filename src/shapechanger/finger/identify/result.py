@@ -1,6 +1,6 @@
-"""Identification of a finger: parameters with intervals, validated on motion that was not fitted.
+"""Identification of a finger: parameters with intervals, and a validation on later motion.
 
-`identify` runs the three fits of this package and collects the results.
+`identify` runs the fits of this package and collects the results.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class ParameterEstimate:
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
-    """Measured and simulated motion in the part of a log that was not fitted."""
+    """Measured and simulated motion in the part of a log that the motion fit did not use."""
 
     t: NDArray[np.float64]  # Time since the start of the log, s, (n,).
     measured: NDArray[np.float64]  # Measured angles, rad, (n, 4).
@@ -130,7 +130,7 @@ class IdentifiedFinger:
         parameters: The finger, for `build_finger` or the env's argument `parameters`.
         estimates: Identified parameters with intervals, the moment arms first.
         undetermined: Names of parameters that the log cannot determine, each with the reason.
-        held_out: Validation on the part of the log that was not fitted.
+        held_out: Validation on the part of the log that the motion fit did not use.
         source: Source named in the log.
         seconds: Length of the log, s.
     """
@@ -311,7 +311,7 @@ def _parameters(
     dynamics: Mapping[str, tuple[float, float]],
     known: FingerParameters | None,
 ) -> FingerParameters:
-    """The identified finger, in which undetermined parameters are the known or nominal ones."""
+    """The identified finger, in which undetermined parameters are known or assumed ones."""
     noise = float(np.sqrt(np.mean(kinematics.joint_noise**2)))
     plain = with_motors(motors, known)
     if known is not None and known.path is not None:
