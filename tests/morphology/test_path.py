@@ -92,7 +92,7 @@ def test_common_edits_are_interpolated() -> None:
     )
 
 
-def test_edits_of_one_body_only_fade() -> None:
+def test_edits_that_only_one_body_has_fade() -> None:
     a = (Mass("*", scale=2.0), Stretch("thigh", 2.0))
     b = (Mass("*", scale=2.0), Stretch("shin", 2.0), Gear("*", scale=3.0))
     assert interpolate(a, b, 0.25) == (

@@ -230,7 +230,7 @@ def _gap(model: mujoco.MjModel, pose: np.ndarray) -> float:
 @pytest.mark.parametrize("jacobian", ["dense", "sparse"])
 @given(seed=st.integers(0, 1000), scale=st.sampled_from([0.05, 0.3]))
 def test_a_drawn_start_closes_loops(jacobian: str, seed: int, scale: float) -> None:
-    """The pose is inside the limits and above the floor, and the velocities open no loop."""
+    """The pose is inside the limits, and the velocities open no loop."""
     model = mujoco.MjModel.from_xml_string(_FOUR_BAR.format(jacobian=jacobian))
     data, rules = mujoco.MjData(model), StartRules(model)
     start = start_pose(model)
@@ -269,7 +269,7 @@ def test_coupled_joints_start_coupled(
 
 
 def test_a_start_that_cannot_be_closed_is_the_files_own() -> None:
-    """Here no drawn deviation can be closed, because damping locks a joint."""
+    """Neither the drawn pose nor nearer ones close: damping locks a joint that must be 0."""
     text = _COUPLED.format(low=-3, high=3, coefficients="0 1 0 0 0").replace(
         'name="follow"', 'name="follow" damping="1e11"'
     )
@@ -281,7 +281,7 @@ def test_a_start_that_cannot_be_closed_is_the_files_own() -> None:
 
 
 def test_a_joint_at_its_limit_leaves_the_step_to_others() -> None:
-    """The leader is at its upper limit, so only the follower moves."""
+    """The leader is at its upper limit and stays there; only the joints that follow it move."""
     text = _COUPLED.format(low=-3, high=3, coefficients="0 1 0 0 0")
     model = mujoco.MjModel.from_xml_string(text)
     pose = StartRules(model).feasible(np.array([1.0, 2.5, -1.25]), mujoco.MjData(model))

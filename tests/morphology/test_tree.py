@@ -68,7 +68,7 @@ def test_an_ants_tree() -> None:
 
 
 def test_numbers_follow_the_edits() -> None:
-    """A longer shank, a stronger motor and a heavier trunk change only their own numbers."""
+    """A longer shank, a stronger motor and a heavier trunk change their numbers."""
     plain = _ant(())
     changed = _ant((Stretch("shank_1", 2.0), Gear("hip_2", 10.0), Mass("torso", 10.0)))
     one, other = (
@@ -271,13 +271,13 @@ def test_what_an_equality_couples_to_the_robot_is_part_of_it(
     assert set(_robot(model)) == {*_ROBOT, *also}
 
 
-def test_without_actuators_everything_is_the_robot() -> None:
-    """Motors may be added to such a model later. The world is not part of the robot."""
+def test_without_actuators_every_tree_is_part_of_the_robot() -> None:
+    """Motors may be added to such a model later. Neither the world nor a fixed table is part."""
     assert _robot(_model("")) == ["ball", "door", "base", "arm"]
 
 
 def test_the_trunk_is_the_tree_that_most_actuators_move() -> None:
-    """The trunk is neither a free ball nor a robot with fewer motors."""
+    """The trunk is neither a ball without actuators nor a robot with fewer motors."""
     assert travelling_body(_model(_MOVED_BY_JOINT)) is None
     assert trunk_lift(_model(_MOVED_BY_JOINT)) is None
     model = _model(

@@ -35,7 +35,7 @@ Body = tuple[Edit, ...]
 # MuJoCo uses sparse constraint Jacobians from 60 degrees of freedom on. Newton's solver of this
 # version then factorises a wrong Hessian; 4.0.1 fixes this (google-deepmind/mujoco#3767).
 _WRONG_SPARSE: Final = "4.0.0"
-_WITH_PART: Final = 0.5  # Share of the training bodies that have one of the family's parts.
+_WITH_PART: Final = 0.5  # Share of bodies with one part, except in "composition".
 
 
 def to_json(body: Iterable[Edit]) -> str:
@@ -343,7 +343,7 @@ def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, .
 
 
 def strength_axes(trunk: str) -> tuple[Axis, ...]:
-    """Return axes for the mass of the trunk, a body, the strength of motors and all friction."""
+    """Return axes for the mass of the trunk, a body, the strength of motors and the friction."""
     return (
         Axis(f"mass of {trunk}", partial(Mass, trunk), 0.7, 1.5, 0.5, 2.5),
         Axis("strength of the motors", partial(Gear, "*"), 0.8, 1.25, 0.6, 1.6),

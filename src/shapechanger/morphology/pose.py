@@ -29,10 +29,10 @@ _FAR_M: Final = 1000.0  # Largest distance at which a floor is searched.
 _LOCKED: Final = 1e5  # A joint is locked if damping slows it by more than this factor per step.
 _VERTICAL: Final = 1e-6  # Tolerance of the vertical part of an axis that counts as vertical.
 _MOST_STEPS: Final = 40  # Largest number of steps to close the loops of a start pose.
-_START_CLOSED: Final = 1e-4  # Largest violation of a start pose, m or rad.
+_START_CLOSED: Final = 1e-4  # Violation up to which a start pose counts as closed, m or rad.
 _SHARES: Final = (0.5, 0.25, 0.125)  # Shares of a drawn deviation, tried until the loops close.
-# If the pose of the file is outside its limits, the steps start from random deviations of the drawn
-# pose, because from a stretched arm they do not close loops. One in ten closes the loop of
+# If the pose of the file is outside its limits, random deviations of the drawn pose are tried too,
+# because the steps do not close loops from a stretched arm. One in ten closes the loop of
 # Metaworld's Sawyer.
 _BEND: Final = 0.6  # Size of a deviation, rad or m.
 _MOST_BENDS: Final = 40  # Largest number of deviations.
@@ -44,7 +44,7 @@ def robot_bodies(model: mujoco.MjModel) -> NDArray[np.bool_]:
     The robot is every kinematic tree that an actuator moves, through a joint, tendon, site or body;
     every tree that an active equality couples to one of these, such as the second finger of a
     gripper or a link of a closed loop; and the fixed bodies that carry these trees. In a model
-    without actuators the robot is all bodies. The world is never part of it.
+    without actuators, every tree is part of the robot. The world is never part of it.
     """
     trees, of_tree = moved_trees(model), model.body_treeid
     roots = model.body_rootid[np.isin(of_tree, trees)]
@@ -172,7 +172,7 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
 
 
 def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
-    """Return a pose (nq,) with the trunk raised or lowered until its lowest point is on the floor.
+    """Return a pose (nq,) with the trunk at the height at which the robot just touches the floor.
 
     The pose is returned unchanged if no joint raises the trunk or no floor is below it.
     """
@@ -324,7 +324,7 @@ class StartRules:
         return largest(equality_rows(self._model, data)[1])
 
     def _closed(self, drawn: _Array, start: _Array, goal: float, data: mujoco.MjData) -> _Array:
-        """Return a pose near `drawn` that violates the equalities by at most `goal`, if found."""
+        """Return a pose near `drawn` that violates at most `goal`; else the start or best try."""
         is_inside = bool(np.all(start == self.keep_within_limits(start)))
         best, least = start.copy() if is_inside else drawn, np.inf
         for pose in self._tries(drawn, start, is_inside):

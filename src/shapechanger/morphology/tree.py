@@ -25,9 +25,9 @@ _NO_MOMENT: Final = 1e-9  # A smaller moment, m or 1, is rounding.
 _EQUAL: Final = 1e-6  # Moments that differ by a smaller share are equal.
 
 LIMB_NUMBERS: Final = (
-    *("joint x", "joint y", "joint z", "distance"),  # From the trunk's origin: direction, and m.
+    *("joint x", "joint y", "joint z", "distance"),  # Direction from the trunk's origin; m.
     *("axis x", "axis y", "axis z"),
-    *("end x", "end y", "end z", "length"),  # From joint to farthest end: direction, and m.
+    *("end x", "end y", "end z", "length"),  # Direction from joint to farthest end; m.
     *("mass", "mass with limbs"),  # Decades above 1 kg.
     *("start", "lower", "upper"),  # Start and limits of the joint, rad or m; 0 without limits.
     *("strength", "damping", "armature"),  # Logarithms, so that each is about 1.

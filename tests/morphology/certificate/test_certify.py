@@ -299,7 +299,7 @@ def test_a_mass_written_into_a_compiled_model_is_found() -> None:
         (lambda m: m.tendon_length0.fill(9.0), "tendon_length0 is 9"),
     ],
 )
-def test_writes_without_effect_are_found(
+def test_writes_that_need_set_const_are_found(
     edit: Callable[[mujoco.MjModel], object], message: str
 ) -> None:
     model = mujoco.MjModel.from_xml_string(EVERYTHING.replace('gravcomp=".1"', ""))

@@ -110,7 +110,7 @@ def test_random_scenes_have_the_predicted_contacts(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("flag", ["contact='enable'", "filterparent='disable'"])
 def test_contact_pairs_are_those_of_mujoco(seed: int, flag: str) -> None:
-    """In random trees of overlapping balls, exactly the pairs that pass the filters collide."""
+    """In random trees of overlapping balls, exactly the predicted pairs collide."""
     random = np.random.default_rng(seed)
     spec = mujoco.MjSpec()
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1])

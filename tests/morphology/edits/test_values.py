@@ -61,7 +61,7 @@ _MOTORS = """
         '<inertial pos=".1 0 0" mass="2" diaginertia=".1 .2 .25"/><geom size=".1"/>',
     ],
 )
-def test_a_mass_can_be_set_from_geoms_or_an_inertial_element(content: str) -> None:
+def test_a_mass_of_geoms_or_of_an_inertial_element_can_be_set(content: str) -> None:
     before, after = built(limb(content)), built(limb(content), Mass("link", to=0.7))
     assert mass(after, "link") == pytest.approx(0.7)
     np.testing.assert_allclose(
@@ -239,7 +239,7 @@ def test_a_motor_of_a_tendon_is_not_a_motor_of_the_joint_of_the_same_name() -> N
 
 
 def test_a_fixed_robot_is_set_free() -> None:
-    """The robot falls with its whole mass, although MuJoCo merges a URDF's base with the world."""
+    """The robot has its whole mass, although MuJoCo merges a URDF's base with the world."""
     fixed = built(spec_of(URDF))
     assert (fixed.nq, fixed.body_mass[0]) == (2, 0.0)
     free = compile_body(

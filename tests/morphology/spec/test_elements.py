@@ -1,4 +1,4 @@
-"""Selection, naming and copies of elements; frames and a total mass become their own numbers."""
+"""Selection, naming and copies of elements; frames and a total mass that are written out."""
 
 from __future__ import annotations
 

@@ -149,9 +149,9 @@ def test_children_move_along_with_a_stretch() -> None:
     ],
 )
 def test_meshes_and_explicit_inertias_prevent_reshaping(edit: Edit) -> None:
-    """A limb with a mesh or an explicit inertia can still be removed."""
+    """A limb with a mesh can still be removed."""
     with pytest.raises(
-        MorphologyError, match=r"'link\w*' holds 'horn\w*', a mesh; only spheres, caps"
+        MorphologyError, match=r"'link\w*' holds 'horn\w*', a mesh, height field or SDF; only"
     ):
         built(spec_of(_MESH), edit)
     with pytest.raises(

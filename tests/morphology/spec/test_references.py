@@ -1,4 +1,4 @@
-"""Edits update or refuse references between elements; here one reference at a time."""
+"""Edits update references between elements, or are refused; here one reference at a time."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The certificate of a shift: the proven differences between two embodiments, or a refusal.
 
-Some declared shifts have no effect: a friction below the floor's, a context that no code reads. So
+Some declared shifts have no effect: a friction below the floor's, a setting that no code reads. So
 two environments are compared by their effective models and by their responses to the same commands.
 A shift that changes neither is refused.
 """
@@ -53,7 +53,7 @@ class Rollout(msgspec.Struct, frozen=True):
     start and the reward.
 
     Attributes:
-        steps: Commands given before the first of the two ended its episode.
+        steps: Number of steps that both took; fewer than requested if an episode ended.
         identical: Whether observations, rewards and ends are the same.
         differs_by_rounding: Whether rounding explains all differences; true without differences.
         sentences: Where the observations diverge, which numbers only one environment observes, and
@@ -157,7 +157,7 @@ def certify(
 ) -> Certificate:
     """Compare two environments and certify the shift between them.
 
-    Both are reset and stepped, and left in the middle of an episode. Observations are read from the
+    Both are reset and stepped, and not reset afterwards. Observations are read from the
     outermost wrapper. An environment must have `reset` and `step` as in Gymnasium, a `model`, an
     `observation_layout` and an `action_layout`, and may have a `standing_height`, m. Gymnasium
     itself is not needed.
@@ -167,12 +167,12 @@ def certify(
         target: The environment that it is transferred to.
         steps: Number of commands of the rollout.
         seed: Seed of the resets and of the commands.
-        labels: Labels of the two; by default the ids of the environments, or their classes.
+        labels: Labels of the two; by default the `label`, id or class of each environment.
         allow_empty: Whether to certify a shift without differences.
 
     Raises:
         MorphologyError: If one of them has no model, such as a vehicle's env.
-        EmptyShift: If there is no difference and `allow_empty` is false.
+        EmptyShift: If there is no difference beyond rounding and `allow_empty` is false.
     """
     inner = [getattr(env, "unwrapped", env) for env in (source, target)]
     names = labels or tuple(map(_label, (source, target), inner))
@@ -211,8 +211,8 @@ def matched_commands(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Draw commands for two robots: the same for motors of the same name, zero for the others.
 
-    The commands of a motor depend only on the seed and on its name, and lie where its ranges in the
-    two robots overlap. Each array has the shape (steps, size of the robot's action layout).
+    Commands depend on the seed, the motor's name and the overlap of its ranges in the two robots,
+    and are clipped to each range. Each array has the shape (steps, size of the action layout).
     """
     one, two = (dict(zip(value_names(s), _ranges(s), strict=True)) for s in (source, target))
 
@@ -231,7 +231,7 @@ def matched_commands(
 
 
 def _ranges(layout: Layout) -> list[_Range]:
-    """Return finite ranges: a missing bound is -1 or 1, or else 1 below or above the other one."""
+    """Return finite ranges: a missing bound is -1 or 1, or 1 beyond the other if farther out."""
     low, high = layout.low, layout.high
     bottom = np.where(np.isfinite(low), low, np.minimum(-1.0, high - 1.0))
     top = np.where(np.isfinite(high), high, np.maximum(1.0, low + 1.0))
@@ -243,8 +243,8 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
 
     A command is drawn per motor name, so a motor that both have gets the same number whatever
     other motors there are; a motor that only one of them has gets zero. The source runs first and
-    the target after it, so one object may be both. Each is left in the middle of an episode. The
-    rollout stops after fewer than `steps` steps if an episode ends.
+    the target after it, so one object may be both. Neither is reset afterwards. The rollout
+    stops after fewer than `steps` steps if an episode ends.
     """
     commands = matched_commands(_layout(source, "action"), _layout(target, "action"), steps, seed)
     before, over = _drive(source, commands[0], seed)
@@ -253,7 +253,7 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
     ended = over and len(before) == rows, new_over and len(after) == rows
     old, new = (value_names(_layout(env, "observation")) for env in (source, target))
     sizes = before.shape[1] - 1, after.shape[1] - 1
-    if (len(old), len(new)) != sizes:  # A wrapper has changed the observation: name its indices.
+    if (len(old), len(new)) != sizes:  # A wrapper has changed the observation.
         old, new = ([f"observation[{place}]" for place in range(size)] for size in sizes)
     shared = [name for name in old if name in frozenset(new)]
     gaps, excess = _gaps(
@@ -291,10 +291,10 @@ def _layout(env: Any, side: str) -> Layout:
 
 
 def _gaps(before: _Floats, after: _Floats) -> tuple[_Floats, _Floats]:
-    """Return absolute differences, (n, numbers), and the largest per step in tolerances, (n,).
+    """Return absolute differences, (n, numbers), and the largest ratio per step, (n,).
 
-    If numbers differ and one is not finite, their difference is the largest finite
-    number.
+    The ratio is a relative difference divided by `_TOLERANCE`. If numbers differ and one is not
+    finite, their difference is the largest finite number.
     """
     same = (before == after) | (np.isnan(before) & np.isnan(after))
     with np.errstate(invalid="ignore"):
@@ -330,7 +330,7 @@ def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None)
 
     Writing mass without inertia, or either without calling `mujoco.mj_setConst`, leaves an
     inconsistent model: MuJoCo softens contacts and limits by inverse weights that no longer hold,
-    copies frames that no longer coincide, and ignores gravity compensation, adhesion or an
+    treats moved frames as coincident, and ignores gravity compensation, adhesion or an
     actuator's damping if there was none when the model was compiled.
 
     Args:

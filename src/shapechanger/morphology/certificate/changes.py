@@ -25,13 +25,13 @@ from shapechanger.morphology.certificate.numbers import (
 _Elements = dict[str, dict[str, Values]]
 _Row = tuple[str, str, float | None, float | None, str]  # The fields of a `Change` of one number.
 ROUNDING: Final = 1e-9
-"""Tolerance of equal numbers, relative to the largest number of their field. Writing out a total
-mass, another order of a sum and another processor change the last bits, and constants that MuJoCo
-derives are less exact."""
+"""Tolerance of equal numbers, relative to the largest of the compared ones. A total mass that is
+written out, another order of a sum and another processor change the last bits, and constants that
+MuJoCo derives are less exact."""
 _NOISE: Final = 1e-14
 """Tolerance relative to the largest number of a field in the whole model: a computed zero, such as
 after turning a frame, is not exactly zero."""
-_ROUNDED_TO: Final = 10  # Digits of a field's largest number; the error is at most half `ROUNDING`.
+_ROUNDED_TO: Final = 10  # Digits of the largest number; the error is at most half `ROUNDING`.
 # 64 bits: the chance that two of a million different models collide is 1 in 37 million.
 _HEX_DIGITS: Final = 16
 
@@ -118,7 +118,7 @@ def compare(
     *,
     standing_height: tuple[float | None, float | None] = (None, None),
 ) -> tuple[Change, ...]:
-    """Return the differences between two models that decide their motion.
+    """Return the differences between two models that affect their motion.
 
     Args:
         source: The model that a policy is trained on.
@@ -126,7 +126,7 @@ def compare(
         standing_height: Heights at which the source and the target stand, m; None if unknown.
 
     Returns:
-        The changes: standing height, dimensions and total mass first, then element by element.
+        The changes: standing height, number of bodies, total mass and lengths, then each element.
             Empty for models whose elements have the same names and numbers.
     """
     robot: list[_Row] = [("standing height", "robot", *standing_height, "m")]
@@ -140,7 +140,7 @@ def compare(
         if not _equal(fields["values"], two["derived"][name]["values"])
     ]
     if found or derived:
-        # The order of the bodies may change the last digit of the sum.
+        # `fsum` is exact; in a plain sum, the order of the bodies may change the last digit.
         old, new = (math.fsum(m.body_mass[m.body_treeid >= 0].tolist()) for m in (source, target))
         robot.append(("dimensions", "nbody", float(source.nbody), float(target.nbody), "1"))
         robot.append(("total mass", "robot", old, new, "kg"))

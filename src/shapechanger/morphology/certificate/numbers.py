@@ -245,7 +245,7 @@ def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
 def mixed_parameters(model: mujoco.MjModel, pairs: _Ints) -> dict[str, _Floats]:
     """Return the parameters that MuJoCo mixes for pairs of geoms (n, 2), named as in `pair_*`."""
     priority = model.geom_priority[pairs[:, 0]] - model.geom_priority[pairs[:, 1]]
-    # The weight of the first geom's solver parameters; half if neither states one.
+    # The weight of the first geom's solver parameters; half if both weights are zero.
     weights = np.where(model.geom_solmix < mujoco.mjMINVAL, 0.0, model.geom_solmix)[pairs]
     total = weights.sum(axis=1)
     share = np.where(total, weights[:, 0] / np.where(total, total, 1.0), 0.5)[:, None]

@@ -60,7 +60,7 @@ class Edit(
 
     Raises:
         MorphologyError: If a field has the wrong type, or a number is not finite or out of its
-            range; of a subclass, if another one has its name.
+            range; for the definition of a subclass, if another kind has its name.
     """
 
     needs: ClassVar[tuple[mujoco.mjtDisableBit, str] | None] = None

@@ -1,4 +1,4 @@
-"""Edits of the structure of a body: lock, drive and free joints; cut, remove, split and add limbs.
+"""Edits of structure: lock joints, add motors and free joints; cut, remove, split and add limbs.
 
 A URDF file has no motors and is fixed to the world: with `AddMotor` and `AddFreeJoint` it becomes a
 robot that can move.
@@ -32,7 +32,7 @@ from shapechanger.morphology.spec.carried import Keyframes
 
 _J: Final = mujoco.mjtJoint
 _O: Final = mujoco.mjtObj
-# MuJoCo needs a range above zero: smallest range of a partly locked joint.
+# Smallest range of a partly locked joint, rad or m, because MuJoCo needs a range above zero.
 _NARROWEST_RAD: Final = 1e-3
 # MuJoCo refuses bodies of almost no mass, so a limb that exists in part has at least this share of
 # its full size, and so a millionth of its mass. A motor has at least this share of its strength.
@@ -88,8 +88,8 @@ class AddMotor(Edit, frozen=True):
     """Add a motor to joints that have none, named after the joint, with controls from -1 to 1.
 
     Attributes:
-        joint: Name or glob of the joints. A glob skips joints that have a motor, that follow
-            another joint through an equality, or that no single motor can move.
+        joint: Name or glob of the joints. Joints with a motor, free joints and balls are skipped; a
+            glob also skips joints that follow another one through an equality.
         gear: Torque, N·m, or force, N, for a control of 1; None for the largest that the model
             allows the joint (`effort` in URDF, `actuatorfrcrange` in MJCF).
     """
@@ -247,12 +247,12 @@ class Split(Edit, frozen=True):
 
     The nearer part keeps the body's name and joint. Geoms that the plane of the split cuts are
     divided; all other elements go to the part on their side, spheres and ellipsoids by their
-    middle. The new hinge has the armature, damping and stiffness of the body's own joint.
+    middle. The new hinge has the resistance of the body's own hinge, such as its damping, if any.
 
     Attributes:
         body: Name of the segment; not a trunk.
         name: Name of the farther part, of its hinge and of its motor.
-        at: Position of the split as a share of its length from the joint, between 0 and 1.
+        at: Position of the split as a share of the segment's length from the joint, 0 to 1.
         lower: Lower limit of the hinge, rad.
         upper: Upper limit of the hinge, rad.
         gear: Torque of a motor for a control of 1, N·m; controls are -1 to 1. None for no motor.
@@ -268,7 +268,7 @@ class Split(Edit, frozen=True):
     axis: Vector | None = None
 
     def check(self) -> None:
-        """Refuse a range, gear or axis of zero."""
+        """Refuse an empty range, and a gear or axis of zero."""
         _check_hinge(self)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
@@ -314,7 +314,7 @@ class AddSegment(Edit, frozen=True):
     """Add a segment, with a hinge, at the far end of another.
 
     It is a capsule with the thickness, density, friction and appearance of the segment to which it
-    is added; its hinge has the armature, damping and stiffness of that segment's joint.
+    is added; its hinge has the resistance of that segment's hinge, such as its damping, if any.
 
     Attributes:
         body: Name of the segment to which it is added.
@@ -337,7 +337,7 @@ class AddSegment(Edit, frozen=True):
     radius: Positive | None = None
 
     def check(self) -> None:
-        """Refuse a length, range, gear or axis of zero."""
+        """Refuse an empty range, and a length, gear or axis of zero."""
         _check_hinge(self)
         if not any(self.end):
             raise MorphologyError("The end of a segment must not be zero.")

@@ -90,9 +90,9 @@ def _reshaped(spec: mujoco.MjSpec, pattern: str, factor: float) -> Iterator[mujo
 
 
 class PlaceGeom(Edit, frozen=True):
-    """Change the place, length and radius of one geom only; the rest of its body is unchanged.
+    """Change the place, length and radius of single geoms; other geoms of a body are unchanged.
 
-    Mass and inertia of its body follow at the same density.
+    Mass and inertia of the body follow at the same density.
 
     Attributes:
         geom: Name or glob of the geoms.
@@ -183,7 +183,7 @@ class StartHeight(Edit, frozen=True):
     """Change the height at which a trunk starts.
 
     Attributes:
-        body: Name of a body on the world.
+        body: Name or glob of bodies on the world.
         to: Height of its origin above the world's, -100 to 100 m.
     """
 

@@ -22,8 +22,8 @@ _D: Final = mujoco.mjtDisableBit
 _GAIN: Final = mujoco.mjtGain
 _BIAS: Final = mujoco.mjtBias
 _LINEAR: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE, _BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE)
-# Larger values are typing mistakes. MuJoCo's numbers overflow at 1e6 in any unit used here, and
-# 250 m/s² is ten times the gravity at Jupiter's cloud tops (24.8 m/s²).
+# Limits above which a value is a typing mistake: a million in any unit used here, and 250 m/s², ten
+# times the gravity at Jupiter's cloud tops (24.8 m/s²).
 _LARGEST: Final = 1e6
 _LARGEST_GRAVITY: Final = 250.0
 
@@ -85,7 +85,7 @@ class TotalMass(Edit, frozen=True):
     to: Annotated[float, Meta(gt=0.0, le=_LARGEST)]
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Scale the mass of every body."""
+        """Scale the mass of every body of the robot."""
         model = compiled(spec)
         robot = robot_bodies(model)
         old = float(np.where(robot, model.body_mass, 0.0).sum())
@@ -223,7 +223,7 @@ class Friction(ValueEdit, frozen=True):
     """Change a friction coefficient of geoms, dimensionless for sliding, m for the other two.
 
     MuJoCo uses the larger coefficient of the two geoms that touch: on a floor of 1, a foot of 0.2
-    slides like a foot of 1, and `certify` reports no change. Change the floor too, or all geoms
+    slides like a foot of 1, and `certify` refuses the shift. Change the floor too, or all geoms
     with `"*"`.
 
     Attributes:
@@ -252,7 +252,7 @@ class Friction(ValueEdit, frozen=True):
 class JointRange(Edit, frozen=True):
     """Change how far hinges and slides move; a joint without limits becomes limited.
 
-    A slide without limits needs both limits. At an amount below 1, they are farther apart.
+    A slide without limits needs both limits, which are farther apart at an amount below 1.
 
     Attributes:
         joint: Name or glob of the joints.

@@ -1,6 +1,6 @@
 """Data that refer to positions or order: keyframes, pins of loops, paths of tendons.
 
-While edits are applied, keyframes are removed, and each pin (a `connect` or `weld`) is replaced by
+While edits are applied, keyframes are removed, and each pin (a `connect` or `weld`) is moved to
 two sites. MuJoCo states a pin in the frame of its first body, and derives its place on the second
 body from the model's own pose. After the edits, that pose is changed until every loop that was
 closed in it is closed again. Then pins and keyframes are written back.
@@ -46,7 +46,7 @@ _WITHIN: Final = 1e-6  # A tendon may exceed its limit by this much, m or rad.
 _TOGETHER: Final = 1e-8  # Points of a closed loop coincide within this, m.
 _STILL: Final = 1e-12  # A smaller motion of a joint is rounding, rad or m.
 CLOSED: Final = 1e-9
-"""Residual of an equality that is closed, m or rad; above the rounding of a compiled model."""
+"""Largest residual of a closed equality, m or rad; above the rounding of a compiled model."""
 SINGULAR: Final = 1e-6
 """Singular values below this share of the largest belong to motions that do not close a loop."""
 
@@ -229,7 +229,7 @@ def _close_loops(
     mujoco.mj_fwdPosition(model, data)
     lengths = np.array(data.ten_length)
     kinds = model.jnt_type
-    # These balls cannot move, because their turn would be measured from the new pose.
+    # Balls with a limit, spring or motor stay: their turn is measured from the model's own pose.
     driven = model.actuator_trnid[np.isin(model.actuator_trntype, [int(t) for t in OF_JOINTS]), 0]
     measured = (model.jnt_limited != 0) | (model.jnt_stiffness != 0.0)
     measured |= np.isin(np.arange(model.njnt), driven)
@@ -359,10 +359,11 @@ def equality_rows(
 def close(
     model: mujoco.MjModel, data: mujoco.MjData, movable: NDArray[np.bool_], most_steps: int
 ) -> float:
-    """Move the pose in `data` to the nearest pose in which the equalities hold.
+    """Move the pose in `data` towards the nearest one in which the equalities hold.
 
-    Only the `movable` degrees of freedom (nv,) move. Hinges and slides stay inside their limits;
-    those outside get no farther away. The largest remaining violation is returned, m or rad.
+    Only the `movable` degrees of freedom (nv,) move, in at most `most_steps` steps. Hinges and
+    slides stay inside their limits; those outside get no farther away. The largest remaining
+    violation is returned, m or rad.
     """
     scalar, at_limit = np.flatnonzero(model.jnt_type > int(_J.mjJNT_BALL)), np.zeros(model.nv, bool)
     places, dofs = model.jnt_qposadr[scalar], model.jnt_dofadr[scalar]

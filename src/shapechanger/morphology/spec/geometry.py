@@ -189,7 +189,7 @@ def inertia_is_written_out(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
 
 
 def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
-    """Refuse a body with mass and inertia that do not depend on the shapes of its geoms."""
+    """Refuse a body with a written inertia, a mesh, height field or SDF; it cannot be reshaped."""
     if inertia_is_written_out(spec, body):
         raise MorphologyError(
             f"{body.name!r} has its inertia written out, so it would not follow a new shape: "
@@ -198,8 +198,8 @@ def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
     for geom in body.geoms:
         if geom.type in (_G.mjGEOM_MESH, _G.mjGEOM_HFIELD, _G.mjGEOM_SDF):
             raise MorphologyError(
-                f"{body.name!r} holds {geom.name!r}, a mesh; only spheres, capsules, cylinders, "
-                "boxes and ellipsoids can be reshaped."
+                f"{body.name!r} holds {geom.name!r}, a mesh, height field or SDF; only spheres, "
+                "capsules, cylinders, boxes and ellipsoids can be reshaped."
             )
 
 
@@ -214,10 +214,10 @@ def move_outwards(element: Any, held: Array, factor: float | Array) -> None:
 def lengthen(geom: mujoco.MjsGeom, factor: float, axis: int | None) -> None:
     """Scale the longest half-size of a geom, or the half-size along an axis of the body.
 
-    A geom oblique to the axis is refused. Spheres and geoms defined by their ends are unchanged.
+    A geom oblique to the axis is refused; one across it, spheres and geoms with ends are unchanged.
     """
     if geom.type == _G.mjGEOM_SPHERE or has_ends(geom):
-        return  # A sphere has no length.
+        return  # A sphere has no length, and ends are moved by `move_outwards`.
     place, direction = (1, 2) if geom.type in LONG else (int(np.argmax(geom.size)),) * 2
     if axis is not None:
         # Cosines between the axes of the geom and the axis of the body.
@@ -349,7 +349,7 @@ class Plane:
         return self._share(middle_of(point)) > 1.0 - _SAME
 
     def piece_of(self, geom: mujoco.MjsGeom) -> NearPart:
-        """Return the part of a geom on the near side, by its middle if it has no length."""
+        """Return the part of a geom on the near side: all or none of a geom without a length."""
         ends, axis = self._ends(geom)
         if not len(ends):
             middle = middle_of(geom)
@@ -365,7 +365,7 @@ class Plane:
         return NearPart(near, (self._part - inner) / (outer - inner), axis)
 
     def _ends(self, geom: mujoco.MjsGeom) -> tuple[Array, int]:
-        """Return both ends of a geom along the segment, and the index of the half-size there."""
+        """Return both ends of a geom along the segment, and the index of that half-size."""
         if geom.type != _G.mjGEOM_BOX:
             return axis_ends(geom), 1
         if has_ends(geom):

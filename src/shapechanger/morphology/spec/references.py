@@ -1,7 +1,7 @@
 """References between the elements of a model, and the one rule for edits that touch them.
 
 An edit updates every reference to an element that it changes, or refuses with one sentence. During
-an edit, pins of loops are sites, and values of keyframes are keyed by name (`carried`).
+an edit, pins join sites, and values of keyframes are keyed by name (`carried`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PINS: Final = (_E.mjEQ_CONNECT, _E.mjEQ_WELD)
 COUPLINGS: Final = {_E.mjEQ_JOINT: _JOINT, _E.mjEQ_TENDON: _O.mjOBJ_TENDON}
 """Equalities y - y0 = p(x - x0) of a follower y and a leader x, and the kind of both."""
 MARK: Final = "pin~"
-"""Prefix of the sites that replace the ends of pins while edits are applied."""
+"""Prefix of temporary names during edits: of sites at the ends of pins, and of unnamed tendons."""
 
 TARGETS: Final = {
     **dict.fromkeys(OF_JOINTS, _JOINT),
@@ -247,7 +247,7 @@ def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
 def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
     """Remove a limb with all elements that have no meaning without it.
 
-    Motors, sensors, exclusions, contact pairs, pins and followers go with the limb, and so do the
+    Motors, sensors, exclusions, contact pairs, pins and couplings go with the limb, and so do the
     tendons that move it alone. Cameras and lights that aim at it aim at the body that carried it.
     """
     require_removable(spec, limb)
