@@ -36,7 +36,7 @@ JOINT_RANGE: Final[NDArray[np.float64]] = np.radians(
     [[-20.0, 90.0], [-20.0, 20.0], [0.0, 105.0], [-5.0, 80.0]]
 )
 """Smallest and largest angle of each joint, rad, (4, 2): rounded active ranges of an adult. The
-knuckle flexes down to its hyperextension, here 20 degrees, in adults 0 to 45."""
+lower end of MCP flexion is hyperextension, 0 to 45 degrees in adults."""
 
 DIP_BY_PIP: Final = 0.6
 """Angle of the end joint divided by the angle of the middle joint: the extensor hood and its

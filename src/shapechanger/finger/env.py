@@ -311,8 +311,8 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def identified_source(self, seed: int) -> dict[str, Any]:
         """Identify this finger, and return arguments of `Finger-v1` for a finger like it.
 
-        The finger moves for ten seconds, determined by `seed`. For a finger with a command path,
-        each episode draws another finger from the gap `geared_around` the identified one.
+        The finger moves for ten seconds, determined by `seed`. If it has a command path, the
+        arguments are a gap, from which each episode draws a finger; see `geared_around`.
         """
         # Imported here, because an env that only steps does not need the optimiser.
         from shapechanger.finger.identify import identify, record_babble

@@ -39,7 +39,7 @@ def test_children_beyond_a_cut_are_removed() -> None:
         assert built(asset_spec("hopper"), Cut(body, 1.0)).nbody == 5
 
 
-def test_a_cut_leaves_something() -> None:
+def test_a_cut_that_leaves_nothing_is_refused() -> None:
     spec = arm()
     spec.geom("lower").fromto = [0.3, 0.0, 0.0, 0.4, 0.0, 0.0]
     with pytest.raises(MorphologyError, match=r"No geom of 'lower' lies within 0\.5 of its"):

@@ -1,9 +1,10 @@
 """Numbers of a compiled model, read by the table `fields.toml`, and its contacts.
 
 A number is left out if the condition of its array does not hold for the element. Elements without
-an effect are left out too: geoms that neither touch nor guide a tendon, sites without references,
-and bodies that carry only such elements. Joints and actuators are in the model's order, which
-gives the numbers of state and control their meaning; all other elements are sorted by name.
+an effect are left out too: geoms that touch nothing, guide no tendon and feel no fluid, sites that
+nothing uses, and bodies without joint or moving mass that carry only such elements. Joints and
+actuators are in the model's order, as are the numbers of state and control; all other elements are
+sorted by name.
 
 The friction of one geom may have no effect: a contact uses the larger coefficient of its two geoms,
 so a slippery foot on a rough floor acts like a rough foot. `contact_arrays` follows the
