@@ -50,7 +50,7 @@ _INERTIA: Final = r"'.+' has its inertia written out, so it would not follow a n
 _MOTORS: Final = (AddMotor("*"),)
 _WILD: Final = r"The simulation diverges at step \d+ of random actions: give the actuators"
 _AT_ONCE: Final = r"The simulation diverges at step 1 of random actions: give the actuators"
-_MESH: Final = r"'.+' holds '.+', a mesh; only spheres, capsules"
+_MESH: Final = r"'.+' holds '.+', a mesh, height field or SDF; only spheres"
 
 pytestmark = [
     pytest.mark.slow,
