@@ -1,4 +1,4 @@
-"""Properties of the driving reward."""
+"""Properties of the driving reward, and of duty cycles."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_reversing_costs_what_driving_forward_earns(speed: float, dt: float) -> 
 
 @given(speed=speeds, dt=seconds)
 def test_the_reward_does_not_depend_on_the_control_rate(speed: float, dt: float) -> None:
-    """Two steps of half the duration have the rewards of one whole step."""
+    """Without a collision, two steps of half the duration have the rewards of one whole step."""
     whole = DriveReward().terms(speed, False, True, dt)
     half = DriveReward().terms(speed, False, True, dt / 2)
     for name in whole:
@@ -77,7 +77,7 @@ def test_weights_are_set_by_name() -> None:
 
 @given(st.floats(0.0, 0.5), st.floats(0.6, 1.0), st.floats(0.0, 1.0))
 def test_a_duty_has_the_size_of_its_value(start: float, full: float, value: float) -> None:
-    """A duty's size equals its value within a step of 1 %; only a duty of 0 stops the motor."""
+    """A duty's size is its value, up to the steps of 1 %; only a duty of 0 stops the motor."""
     duty = Duty(start, full)
     size = duty.size_at(duty.of(value))
     assert size == pytest.approx(value, abs=0.5 / 100 / (full - start) + 1e-9) or size == 0.005

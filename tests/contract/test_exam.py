@@ -1,4 +1,4 @@
-"""Every env of the catalogue passes the checks of `shapechanger.contract.testing`."""
+"""Envs of families, files, vehicles and fingers pass the checks of `contract.testing`."""
 
 from __future__ import annotations
 

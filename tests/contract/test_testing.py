@@ -32,7 +32,7 @@ def _box(size: int, dtype: Any, bound: float = np.inf) -> gym.spaces.Box:
 
 
 class Walk(gym.Env[np.ndarray, np.ndarray]):
-    """Point mass on a line that keeps every promise; each env below breaks one."""
+    """Point mass on a line that keeps every promise; each env in `_BROKEN` breaks one or more."""
 
     observation_layout = Layout((Feature("point/x", "m", -1.0, 1.0), Feature("point/vx", "m/s")))
     action_layout = Layout((Feature("point/motor", "1", -1.0, 1.0),))

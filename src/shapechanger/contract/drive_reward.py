@@ -1,8 +1,8 @@
 """The driving task: go forward fast without collisions and without getting stuck.
 
 The paper of the original release (2017) asks a car to "avoid collisions while maximizing velocity";
-its program returned a reward of 0.0 at every step. Here a term is omitted if its quantity is not
-measured.
+the program of that release returned a reward of 0.0 at every step. Here a term is omitted if its
+quantity is not measured.
 """
 
 from __future__ import annotations

@@ -104,8 +104,8 @@ def each_body(env: EnvRef) -> list[EnvRef]:
             mapping. Without the argument, the result is the env itself.
 
     Raises:
-        StudyError: If `bodies` is invalid, or the env's body belongs to no family.
-        UnknownName: If there is no such split.
+        StudyError: If `bodies` is empty or not a valid `BodyDraw`, or the env has no family.
+        UnknownName: If there is no such split, or the env of a `BodyDraw` does not exist.
         MorphologyError: If no bodies can be drawn from the family.
     """
     if "bodies" not in env.kwargs:
@@ -174,7 +174,7 @@ class EnvTraits:
         exclusive: Whether only one run at a time may use the env, such as a robot.
         individual: Name of the argument that selects one of several robots; may be empty.
         has_demonstrator: Whether the env has an expert for its task.
-        adapts_source: Whether the env has `identified_source` and `randomised_source`.
+        adapts_source: Whether the env has `identified_source`, and with it `randomised_source`.
         family: Name of the continuous family of the env's body; may be empty.
         measures: The performance metrics of a policy, the default first.
         identity: Identity of the env's robot and of its custom files.

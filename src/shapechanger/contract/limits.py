@@ -1,7 +1,7 @@
 """Caps, slew, duty cycles and motion reflexes of a robot; the caller provides the time.
 
 The guard of a robot and its simulation both use this module, so that they move in the same way. It
-only imports the standard library.
+imports only `shapechanger.contract.plan` and the standard library.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from shapechanger.contract.plan import ActionPlan, GuardPlan
 
 _SAME = 1e-6  # Tolerance for values that were rounded to 32-bit floats.
-# gpiozero over lgpio has steps of 1 % (`LGPIOPin._set_state`: `int(value * 100)`). Rounding to them
-# here makes all pin factories act equally, and the returned value is the applied one.
+# Duty cycles have steps of 1 %, as in gpiozero with lgpio, whose `LGPIOPin._set_state` computes
+# `int(value * 100)`. So all pin factories act equally, and `Duty.of` returns the applied duty.
 _STEPS = 100
 # Speed below which a robot counts as standing, m/s: one count per second of a coarse encoder.
 _STANDS_M_PER_S = 0.01
 
 
 def aimed(action: ActionPlan, value: float) -> float:
-    """Return the target of a command's value: clipped to the caps and rounded to a level."""
+    """Return the target of a command's value: clipped to the caps, or one of three levels."""
     if action.levels == "three":
         if value >= action.threshold:
             return action.high
@@ -103,7 +103,7 @@ class Bump:
         self.until_ns: int | None = None
 
     def sense(self, quantities: Mapping[str, float], now_ns: int) -> None:
-        """Update with readings keyed by name, at a time, ns."""
+        """Update with readings keyed by quantity, at a time, ns."""
         touches = quantities.get("bump", 0.0) > 0.0
         self.count += touches and not self._touches
         if touches:
@@ -122,7 +122,7 @@ class Stall:
 
     Attributes:
         way: Sign of the push that stalled; 0 for none.
-        watches: Whether a measured speed is available.
+        watches: Whether stalls can be detected: not disabled, and with a measured speed.
 
     Args:
         after_s: Longest push without motion, s; 0 to disable.
@@ -136,7 +136,7 @@ class Stall:
         self.watches = False
 
     def sense(self, quantities: Mapping[str, float], push: float, now_ns: int) -> None:
-        """Update with readings keyed by name and the applied push, -1 to 1, at a time, ns."""
+        """Update with readings keyed by quantity, and the applied push, -1 to 1, at a time, ns."""
         self.watches = self._after_ns > 0 and "speed" in quantities
         stands = self.watches and abs(quantities["speed"]) < _STANDS_M_PER_S
         pushing = (push > self._threshold) - (push < -self._threshold) if stands else 0
@@ -182,7 +182,7 @@ class Propulsion:
 
 
 class MotionReflexes:
-    """Reflexes that block motion if the robot touches, approaches or pushes against an object.
+    """Reflexes that block motion into an object, and forward motion if the distance is not known.
 
     Attributes:
         bump: Contacts of the bumpers.
@@ -203,7 +203,7 @@ class MotionReflexes:
     def sense(
         self, quantities: Mapping[str, float], is_silent: bool, push: float, now_ns: int
     ) -> None:
-        """Update with readings keyed by name and the applied push, -1 to 1, at a time, ns.
+        """Update with readings keyed by quantity, and the applied push, -1 to 1, at a time, ns.
 
         `is_silent` states whether a distance sensor responded without a distance.
         """

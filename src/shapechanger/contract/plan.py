@@ -2,7 +2,7 @@
 
 The guard of a robot and its simulations use the same plan. The classes are tables of a profile
 (`shapechanger.robot.profile`), whose bounds are checked when it is loaded. They are in this module
-because the guard only imports msgspec and its drivers. The guard receives the plan as JSON.
+so that the guard need not import the reader of profiles. The guard receives the plan as JSON.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ class SensorPlan:
 
 @dataclass(frozen=True, slots=True)
 class LimitPlan:
-    """Limits beyond which the robot stops by itself.
+    """Limits beyond which the robot stops by itself, or does not move in one direction.
 
     Attributes:
         deadline_ms: Time for which the newest command is valid before the robot stops, ms.
@@ -129,7 +129,7 @@ class LimitPlan:
             bumpers, so the robot may still reverse.
         stop_distance_m: Distance ahead below which forward motion is blocked, m; 0 to disable.
             Forward motion is also blocked while a distance sensor has no reading.
-        stall_s: Longest push without motion before the robot stops, s; 0 to disable.
+        stall_s: Longest push without motion, s; then pushing further is blocked; 0 to disable.
         stall_throttle: Propulsion above which motion is expected.
         low_battery_v: Voltage below which the robot stops, V; 0 to disable.
         high_temperature_c: CPU temperature above which the robot stops, °C; 0 to disable.
@@ -151,7 +151,7 @@ class LimitPlan:
         "stall_s": "speed",
         "bump_hold_ms": "bump",
     }
-    """Quantity that a sensor must measure, keyed by the limit that needs it."""
+    """Quantity that a sensor must measure, keyed by the limit that has no effect without it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,14 +178,14 @@ class GuardPlan:
         actions: The actions of a command, in order.
         outputs: The outputs that the actions move.
         sensors: The sensors that the guard reads.
-        limits: Limits beyond which the robot stops by itself.
+        limits: Limits beyond which the robot stops by itself, or does not move in one direction.
         stop: Course of a stop.
         enable_pin: BCM pin that the guard toggles while it runs, for the one-shot circuit that
             keeps the enable line of the motors active; None without it.
         stop_pin: BCM pin of an emergency stop button to ground; None without a button.
         tick_hz: Rate at which the rules run without commands, Hz.
         enable_hold_ms: Time for which the one-shot keeps the enable line active after the last
-            toggle of `enable_pin`, ms. Only a twin of the wiring uses it.
+            toggle of `enable_pin`, ms. Twins of the wiring and settings of servos depend on it.
     """
 
     name: str
@@ -210,7 +210,7 @@ class GuardPlan:
 
 
 def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...]:
-    """Return the value of each output: its offset plus the weighted sum of the actions, in [-1, 1].
+    """Return the value of each output: offset plus weighted sum of the actions, clipped to [-1, 1].
 
     Args:
         plan: The robot.

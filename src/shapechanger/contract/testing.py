@@ -62,7 +62,7 @@ def is_deterministic(make: MakeEnv) -> None:
 
 
 def shares_no_memory(make: MakeEnv) -> None:
-    """Observations share no memory, so a learner may keep them."""
+    """Successive observations share no memory, so a learner may keep them."""
     observations = [observation for observation, _ in _rollout(make())]
     for before, after in pairwise(observations):
         for x, y in product(_arrays(before), _arrays(after)):
@@ -70,7 +70,7 @@ def shares_no_memory(make: MakeEnv) -> None:
 
 
 def names_every_number(make: MakeEnv) -> None:
-    """Layouts have the sizes and bounds of the spaces."""
+    """Layouts have the sizes of the spaces, and the action layout the bounds of its space."""
     with make() as env:
         observation, action = layouts_of(env)
         for side, layout, space, kinds in (
@@ -116,7 +116,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
             f"The simulation diverges at step {step + 1} of random actions: give the actuators a "
             "narrower range, motors of a rig a smaller gear, or the model a shorter time step.",
         )
-        # A mapping is not a term: it contains all terms, or their sources.
+        # A mapping is not a term: `reward_terms` has all terms, and `reward_sources` their sensors.
         named = (value for name, value in info.items() if is_reward_term(name))
         terms = [float(value) for value in named if not isinstance(value, Mapping)]
         _require(bool(terms), "info reports no reward terms.")
@@ -127,7 +127,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
 
 
 def starts_where_it_may(make: MakeEnv) -> None:
-    """Starts differ between seeds and are within the ranges of the layout."""
+    """Starts are not the same for all seeds, and are within the ranges of the layout."""
     with closing(make()) as env:
         layout, space = layouts_of(env)[0], env.observation_space
         seen = [np.asarray(gym.spaces.flatten(space, env.reset(seed=i)[0])) for i in range(20)]
@@ -172,7 +172,7 @@ def examine(make: MakeEnv) -> Iterator[str]:
 
 
 def _same(first: _Rollout, second: _Rollout) -> bool:
-    """Return whether two rollouts are equal to the last bit."""
+    """Return whether two rollouts have the same length and equal numbers."""
     return len(first) == len(second) and all(
         all(map(np.array_equal, _arrays(x), _arrays(y))) and reward_x == reward_y
         for (x, reward_x), (y, reward_y) in zip(first, second, strict=True)

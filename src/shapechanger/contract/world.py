@@ -85,7 +85,7 @@ class World(Protocol):
         ...
 
     def put_back(self) -> None:
-        """Put the vehicle at rest at a free place nearby, after a collision."""
+        """Put the vehicle at rest after a collision: at a free place nearby, by default a start."""
         self.place(0)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
