@@ -99,7 +99,7 @@ ANT: Final = Family(
 # An ant above this multiple of its standing height has been thrown up. The limit of Ant is 0.98 m,
 # Gymnasium's is 1.0; the limit of BigAnt is 1.80 m, the original release's (2017) was 2.0.
 _HIGHEST_STANDS: Final = 1.9
-# All ants start at 0.75 m, and small ants fall from there: they must stay healthy until they land.
+# Ants start at 0.75 m or higher; small ants fall from there, and must stay healthy until they land.
 _HIGHEST_STARTS: Final = 1.3
 
 _sum: Final = np.add.reduce

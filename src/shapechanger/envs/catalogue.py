@@ -1,6 +1,6 @@
 """All envs by name: their ids, registered without importing a simulator, and names that users give.
 
-Users name an env by its id, by a short name such as `BigAnt`, or by the file of a robot.
+Users name an env by its id, a short name such as `BigAnt`, `module:id`, or the file of a robot.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
         name: Its name; the id is `shapechanger/NAME-v1`.
         summary: One-line description; empty for the envs of robots on the network.
         entry_point: Module and class, below `shapechanger`.
-        learner: Name of the learner settings tuned on the family or the env.
+        learner: Name of the env's default learner settings.
         family: Name of its body's family; empty for an env whose body belongs to none.
         reward_threshold: Return that counts as solved.
         episode_steps: Steps after which an episode is truncated; None for never.
@@ -60,7 +60,7 @@ def _by_id(*entries: CatalogueEntry) -> dict[str, CatalogueEntry]:
     return {entry.id: entry for entry in entries}
 
 
-# For each family the module and class of its env, the learner settings tuned on it, and the reward
+# For each family the module and class of its env, its default learner settings, and the reward
 # threshold of Gymnasium's v5 id.
 _FAMILIES: Final = {
     "InvertedPendulum": ("pendulum:InvertedPendulumEnv", "ppo-pendulum", 950.0),
@@ -207,7 +207,7 @@ _REMOTE: Final = _by_id(
     )
 )
 ON_DEVICE: Final = (*CATALOGUE.values(), *FINGER_ENVS.values())
-"""Envs with batched functions for a device, except ODRL's, whose bodies belong to CATALOGUE."""
+"""Envs with batched functions for a device, except ODRL's, whose classes are among these."""
 _DRIVES: Final = {**VEHICLE_ENVS, **RANGES_ENVS, **WAYPOINT_ENVS}
 # All envs but ODRL's.
 _NAMED: Final = {**CATALOGUE, OWN_ROBOT: _OWN, **_DRIVES, **FINGER_ENVS, **_REMOTE}
@@ -216,7 +216,7 @@ _ALL: Final = {**CATALOGUE, **ODRL_ENVS, **_NAMED}
 
 
 def summaries() -> dict[str, str]:
-    """Return a line on each env except ODRL's and those on the network, keyed by id."""
+    """Return a line on each env except ODRL's and those of robots on the network, keyed by id."""
     return {env_id: entry.summary for env_id, entry in _NAMED.items() if entry.summary}
 
 
@@ -286,7 +286,7 @@ def short_name(env_id: str) -> str:
 
 
 def allow_own_modules(*names: str | None) -> None:
-    """Let names such as `my_methods:warm-start` import modules of the current folder.
+    """Let names such as `my_methods:warm-start`, and TOML files, import from the current folder.
 
     Call it only with names that the user gives: a class name in a policy's file must not import
     modules of the folder.
@@ -298,12 +298,12 @@ def allow_own_modules(*names: str | None) -> None:
 
 
 def default_learner(env: EnvRef) -> str:
-    """Return the learner tuned on the env's family; for other envs, the ant's."""
+    """Return the name of an env's default learner settings; the ant's for other packages' envs."""
     return _ALL[env.id].learner if env.id in _ALL else "ppo-run"
 
 
 def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
-    """Return an env with the options of studies: lenses, and vehicles put back after collisions."""
+    """Return an env for a study: a vehicle gets lenses, and is put back after collisions."""
     if lenses and env.id not in VEHICLE_ENVS:
         raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
     if env.id not in _DRIVES:

@@ -29,7 +29,7 @@ _LONGEST_BODY: Final = 60
 
 
 def check_action(env: Any, action: Any) -> NDArray[Any]:
-    """Return an action as an array, or refuse its shape, or numbers that are not finite."""
+    """Return an action as an array; refuse a wrong type or shape, and infinite or NaN numbers."""
     name = type(env).__name__ if env.spec is None else env.spec.id
     array = _as_array(action, f"{name} takes arrays of numbers as actions")
     expected = (env.action_layout.size,)
@@ -160,7 +160,7 @@ def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> lis
     """Return a seed or None per env; a single number is the first env's seed and counts up."""
     if seed is None:
         return [None] * num_envs
-    given: Any = seed  # Not checked at run time.
+    given: Any = seed  # Callers may pass other types.
     is_one = not isinstance(given, Sequence | np.ndarray) or isinstance(given, str | bytes)
     if is_one or np.ndim(cast("Any", given)) == 0:
         first = check_seed(given, VectorEnvError, largest=LARGEST_RESET_SEED - (num_envs - 1))

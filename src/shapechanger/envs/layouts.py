@@ -28,8 +28,8 @@ def position_features(model: mujoco.MjModel) -> list[Feature]:
     """Return a feature for each number of qpos.
 
     `joint/angle` or `joint/position` for a hinge or slide; `body/x` ... `body/qz` for a free joint:
-    place in the world, m, and orientation as a unit quaternion. Limits of joints are soft: contact
-    and motors can press a joint a little beyond them.
+    place in the world, m, and orientation as a unit quaternion, which a ball joint has too. Limits
+    of joints are soft: contact and motors can press a joint a little beyond them.
     """
     features: list[Feature] = []
     for kind, element, j in _joints(model):
@@ -45,10 +45,10 @@ def position_features(model: mujoco.MjModel) -> list[Feature]:
 
 
 def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Feature]:
-    """Return a feature for each number of qvel, clipped at a limit.
+    """Return a feature for each number of qvel, with the range from `-limit` to `limit`.
 
     `joint/velocity` for a hinge or slide; `body/vx` ... `body/wz` for a free joint: velocity in the
-    world's frame, m/s, and angular velocity in the body's, rad/s.
+    world's frame, m/s, and angular velocity in the body's, rad/s, which a ball joint has too.
     """
     features: list[Feature] = []
     for kind, element, _ in _joints(model):
@@ -70,10 +70,10 @@ def body_features(
     """Return features `body/block/quantity` of each body except the world, in world axes.
 
     - `contact` is MuJoCo's `cfrc_ext`: torques `tx` ... `tz`, N·m, and forces `fx` ... `fz`, N.
-    - `inertia` is `cinert`: `xx` ... `yz`, the inertia about the centre of mass of the whole model,
-      kg·m²; `mx` to `mz`, the mass times its distance from there, kg·m; and `mass`, kg.
+    - `inertia` is `cinert`: `xx` ... `yz`, the inertia about the centre of mass of the body's whole
+      tree, kg·m²; `mx` to `mz`, the mass times its distance from there, kg·m; and `mass`, kg.
     - `twist` is `cvel`: the angular velocity `wx` ... `wz`, rad/s; and `vx` ... `vz`, the velocity
-      at the centre of mass of the whole model, m/s.
+      at the centre of mass of the body's whole tree, m/s.
     """
     names = [model.body(b).name for b in range(1, model.nbody)]
     return [
@@ -95,8 +95,8 @@ def drive_features(model: mujoco.MjModel) -> list[Feature]:
 def action_layout(model: mujoco.MjModel) -> Layout:
     """Return a feature per control.
 
-    `actuator/motor` has its gear as gain; `actuator/target` is the position or velocity to which a
-    servo drives its joint.
+    `actuator/motor` on a hinge or slide has a gain: gear times MuJoCo's `gainprm`, N·m or N per
+    unit of control. `actuator/target` is the position or velocity to which a servo drives a joint.
     """
     features: list[Feature] = []
     for a in range(model.nu):

@@ -25,7 +25,7 @@ from shapechanger.errors import VectorEnvError, require_known
 if TYPE_CHECKING:
     from shapechanger.envs.warp.env import WarpVectorEnv
 
-# Reasons why a backend does not have an argument, keyed by the argument.
+# Reasons why a backend does not have an argument, keyed by the backend and the argument.
 _REFUSED: Final = {
     "threads": dict.fromkeys(("device", "pool", "nconmax", "njmax"), "use backend='warp'"),
     "warp": {
@@ -64,7 +64,7 @@ def make_vec(
     copy: bool = True,
     **arguments: Any,
 ) -> ThreadVectorEnv | WarpVectorEnv:
-    """Make a vector env of one id; `gymnasium.make_vec` returns the same.
+    """Make a vector env of one id; `gymnasium.make_vec` makes the same for families and files.
 
     Args:
         env_id: A registered id, or a name of the catalogue, such as `BigAnt`. Envs of other
@@ -72,8 +72,8 @@ def make_vec(
         num_envs: How many envs.
         backend: `threads` steps CPU envs with a few threads; `warp` steps worlds on a device, with
             tensors as results (see `shapechanger.envs.warp.WarpVectorEnv`).
-        threads: How many threads step the envs, including the caller's; 1 starts none. None for as
-            many as the cores that this process may use. The results do not depend on it.
+        threads: How many threads step the envs, including the caller's; 1 starts none. None for one
+            per core that this process may use; never more than envs. Results do not depend on it.
         device: With the backend `warp`: `cpu`, `cuda:0`, ...; None for the first GPU, or the CPU
             if there is no GPU.
         bodies: One body per env instead of one for all. With threads, lengths and masses may
@@ -98,7 +98,7 @@ def make_vec(
         VectorEnvError: If the number of envs or threads is below one, there are not as many bodies
             as envs, an argument belongs to the other backend, or the task has no functions for a
             device.
-        SpaceMismatch: If the spaces of two bodies differ.
+        SpaceMismatch: If the spaces of two bodies differ, with the backend `threads`.
         MissingExtra: If the backend `warp` is not installed.
     """
     count = _at_least_one("env", num_envs)
@@ -118,7 +118,7 @@ def make_vec(
             raise VectorEnvError("backend='warp' always copies observations.")
         if pool is not None and (bodies is not None or not len(pool)):
             raise VectorEnvError("Give either `bodies`, one per world, or a `pool` of some bodies.")
-        from shapechanger.envs.warp import WarpVectorEnv, find_device, make_reader  # Warp.
+        from shapechanger.envs.warp import WarpVectorEnv, find_device, make_reader  # An extra.
 
         limits = {"nconmax": nconmax, "njmax": njmax}
         place = find_device(device)

@@ -23,7 +23,7 @@ _PROBE: Final = 16  # Width and height of an invisible test window, pixels.
 
 
 def has_screen() -> bool:
-    """Return whether a window can be opened: on Linux only with a display."""
+    """Return whether a window can be opened: on Linux only with a display, elsewhere always."""
     return sys.platform != "linux" or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
@@ -90,13 +90,13 @@ def open_context(width: int, height: int) -> Any:
 
 @cache
 def _require_glfw() -> None:
-    """Require, once, that GLFW opens a window."""
+    """Raise a RenderError unless GLFW opens a window; a check that succeeds is not repeated."""
     display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     where, window = f" on the display {display}" if display else "", None
     try:
         glfw: Any = import_module("glfw")
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # The error below has the reason.
+            warnings.simplefilter("ignore")  # The error below is enough.
             if glfw.init() and glfw.get_primary_monitor():
                 glfw.window_hint(glfw.VISIBLE, False)
                 window = glfw.create_window(_PROBE, _PROBE, "", None, None)

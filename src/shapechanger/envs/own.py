@@ -59,7 +59,7 @@ from shapechanger.morphology.pose import (
 
 _Floats = NDArray[np.float64]
 
-# Names of robots in the package are names of its modules.
+# Names of robots in `robot_descriptions`: they are the names of its modules.
 _DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")
 _PACKAGE: Final = "robot_descriptions"
 # Path schemes of ROS and Gazebo.
@@ -110,7 +110,7 @@ class OwnFamily(Family):
 
 
 def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
-    """Replace the `package://` paths of a URDF, which only ROS resolves, by paths of files."""
+    """Replace paths that only ROS and Gazebo resolve by paths of files; refuse COLLADA meshes."""
     for element in (*spec.meshes, *spec.textures):
         if element.file.lower().endswith(".dae"):
             raise BrokenModel(
@@ -197,12 +197,12 @@ class OwnRobotEnv(Reshapable, EzPickle):
 
     - **Observation**: positions and velocities of all joints, without the position of the trunk on
       the floor; or the numbers in the task's `observe`. `observation_layout` names each number.
-    - **Action**: one number per actuator, over its `ctrlrange`; `action_layout` has names, units
+    - **Action**: one number per actuator, within its `ctrlrange`; `action_layout` has names, units
       and gains.
     - **Reward**: the sum of the terms that the task returns, which `info` lists as `reward_...`.
     - **Robot**: all bodies that the actuators move, see
-      `shapechanger.morphology.pose.robot_bodies`. Trunk, standing height, noise and lift concern
-      the robot only, and objects keep their start pose in the file.
+      `shapechanger.morphology.pose.robot_bodies`. Only the robot has a trunk and a standing height,
+      starts with noise, and is lifted to the floor; objects keep their start pose in the file.
     - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
       at least a tenth of its range inside its limits; the feet stand above the floor, and the
       equations of coupled joints and closed loops hold as exactly as in the file. The standing

@@ -47,8 +47,8 @@ class RobotState:
         scaled_action: The action from -1 to 1 over the range of each actuator, shape (nu,).
         standing_height: Height of the trunk above the floor when it stands, m; None for a robot
             that does not stand.
-        can_travel: Whether the trunk can travel in all directions.
-        numbers: All numbers that can be observed, keyed by name.
+        can_travel: Whether the trunk has a free joint, or a slide without limits on the world.
+        numbers: Function that returns any number that can be observed, by its name.
         floor: Height in the world of the floor below the start, m; 0 without a floor.
     """
 
@@ -185,7 +185,7 @@ def reference(task: Any) -> Any:
 
 
 def _found(name: str) -> Any:
-    """Return the built-in task, or the name in a module."""
+    """Return a built-in task, or the object that `module:Name` names."""
     module_name, colon, attribute = name.partition(":")
     if not colon:
         if name not in BUILT_IN:

@@ -112,7 +112,7 @@ class Renderer(MujocoRenderer):
 
 
 def _floors(model: mujoco.MjModel) -> dict[int, _Floats]:
-    """Return the level floors with tiles, and the period of the tiles along x and y, m."""
+    """Return the level floors of finite size with tiles, and the tiles' period along x and y, m."""
     found: dict[int, _Floats] = {}
     for floor in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).tolist():
         material, size = model.geom_matid[floor], model.geom_size[floor, :2]
@@ -190,7 +190,7 @@ def _geoms(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[_Floats, _Floats
     of_body = model.geom_bodyid > 0
     places, radii = data.geom_xpos[of_body], model.geom_rbound[of_body]
     if not len(places):
-        # A URDF may have no shape that touches anything, and then its links are points.
+        # The file of a robot may have no shapes; its links then count as points.
         places, radii = data.xpos[1:], np.zeros(model.nbody - 1)
     return 0.5 * (places.min(axis=0) + places.max(axis=0)), places, radii
 
@@ -221,8 +221,8 @@ def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
     Gymnasium's floors are black and white and mirror half of the light: they distract from the
     body, and flicker towards the horizon; in frames with shadows they turn green, and the shadows
     are black. Its lights are lower than large bodies, and their shadow maps, which do not follow a
-    body that walks, leave dark stripes far from it. The pendulums' models have no sky, and most
-    have no light: their frames would be dark shapes on black.
+    body that walks, leave dark stripes far from it. The pendulums' models have neither a sky nor a
+    light: their frames would be dark shapes on black.
     """
     for texture in spec.textures:
         if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:

@@ -69,8 +69,8 @@ class Reshapable(MujocoEnv):
       more than 256 x 256 pixels have them, and smaller ones, which render twenty times faster
       without them, do not.
     - `fast_model`: whether a cheaper model with bit-equal motion may step the physics, while
-      MuJoCo's profiling clock (`data.timer`) is paused. Ants and pendulums have such a model;
-      other envs accept the argument and ignore it.
+      MuJoCo's profiling clock (`data.timer`) is paused. Ants and single pendulums may have such a
+      model; other envs accept the argument and ignore it.
     - `towards`: another body of the family with the same spaces. Each reset then draws a body
       uniformly between `body` and `towards`, unless the reset gives a body.
 
@@ -80,7 +80,7 @@ class Reshapable(MujocoEnv):
         observation_layout: Name, unit and range of each number of the observation.
         action_layout: Name, unit and range of each number of the action.
         standing_height: Height of the trunk above the floor when it stands with each joint in the
-            middle of its range, m; None for a body that does not stand.
+            middle of its range, or as the subclass defines, m; None if it does not stand.
     """
 
     family: Family
@@ -125,7 +125,7 @@ class Reshapable(MujocoEnv):
         }
 
     def _finish(self, arguments: dict[str, Any]) -> None:
-        """Set attributes that depend on the compiled model, and record the state for pickling."""
+        """Set attributes that depend on the compiled model, and record arguments for pickling."""
         self._follow_body()
         shape = (self.observation_layout.size,)
         if self.observation_space.shape != shape:  # The constructor set it for Gymnasium's body.
@@ -151,7 +151,7 @@ class Reshapable(MujocoEnv):
         self._record_body()
 
     def _record_body(self) -> None:
-        """Record the present body for pickling and in the spec, unless a reset drew it."""
+        """Record the present body for pickling and in the spec, unless resets draw bodies."""
         for record in (self._ezpickle_kwargs, {} if self._spec is None else self._spec.kwargs):
             if self._ends is None:
                 record["body"] = to_json(self.body)
@@ -228,6 +228,7 @@ class Reshapable(MujocoEnv):
 
         Raises:
             BadAction: If the action has another shape or is not finite; the state is unchanged.
+            ResetNeeded: If `reset` has not been called.
         """
         check_action(self, action)
         self._require_reset("step")
@@ -262,7 +263,7 @@ class Reshapable(MujocoEnv):
         return cast("Any", super()).reset_model()
 
     def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
-        """Set the pose (nq,) and the velocities (nv,)."""
+        """Set the pose (nq,) and the velocities (nv,), which a reset first makes feasible."""
         if self._starting:
             rules = self.start_rules()
             qpos = rules.feasible(qpos, self.data, self.init_qpos)
@@ -383,7 +384,7 @@ class Reshapable(MujocoEnv):
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
-        """Return an image of the body in its first pose, on the floor, shape (height, width, 3).
+        """Return an image of the body in its start pose, on the floor, shape (height, width, 3).
 
         Args:
             width: Width in pixels.

@@ -39,7 +39,7 @@ from shapechanger.morphology.pose import standing_height, start_pose, trunk_lift
 
 
 def _runner(name: str, legs: Mapping[str, tuple[str, str, str]]) -> Family:
-    """Return a family of runners in a plane, with legs of thigh, shank and foot to be shortened."""
+    """Return a family of runners in a plane, each leg of which has a thigh, a shank and a foot."""
     limbs = [limb for leg in legs.values() for limb in leg]
     return Family(
         name,
@@ -65,12 +65,12 @@ _CLIPPED_AT: Final = 10.0
 
 
 class Runner(Reshapable):
-    """Mixin for Gymnasium's runners, which start upright with straight legs.
+    """Mixin for Gymnasium's runners, humanoid and swimmer.
 
     The start pose is Gymnasium's, with joints beyond a limit moved to the limit, and the trunk high
     enough for the feet. Noise is drawn as in Gymnasium; joints stay inside their limits and feet
-    above the floor. The standing height is the height in the start pose, because these legs are
-    folded if joints are in the middle of their ranges.
+    above the floor. The standing height is the height in the start pose, because legs are folded if
+    their joints are in the middle of their ranges.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON; None

@@ -23,7 +23,7 @@ from shapechanger.envs.warp.worlds import Infos
 
 
 class DeviceRunner(DeviceTask):
-    """Runners whose episodes never terminate."""
+    """Runners and swimmers, which are always healthy if their CPU env has no healthy heights."""
 
     # Index of the trunk's height in `qpos`.
     height_at: ClassVar[int] = 1

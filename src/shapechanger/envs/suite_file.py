@@ -22,7 +22,7 @@ _SHIPPED: Final = Path(__file__).parent / "suites"
 
 
 class _Body(msgspec.Struct, forbid_unknown_fields=True):
-    """An env with another body, lens or argument."""
+    """An env, with another body, lenses or arguments if they are given."""
 
     env: str
     name: str = ""
@@ -44,10 +44,10 @@ _Env = str | _Body
 
 
 class SuiteFile(msgspec.Struct, forbid_unknown_fields=True):
-    """Contents of a suite's file; one of `envs`, `pairs`, or `sources` with `targets` or `sweep`.
+    """Contents of a suite's file: `envs`, or `pairs`, or `sources` with `targets`, `sweep` or both.
 
     Attributes:
-        learner: Name of the learner; empty for the one tuned on the target.
+        learner: Name of the learner; empty for the target's default.
         arms: Arms of each study; empty for scratch, zero-shot and fine-tune.
         steps: Target steps of a run; None for the learner's number.
         source_steps: Source steps of a source policy; None for the learner's number.
@@ -74,7 +74,7 @@ def shipped_suites() -> tuple[str, ...]:
 
 
 def load_suite(name: str) -> SuiteFile:
-    """Load a suite."""
+    """Load a suite by its name, or from a file."""
     path = _SHIPPED / f"{name}.toml" if name in shipped_suites() else Path(name)
     text, given = read_toml(path, "suite", shipped_suites())
     try:

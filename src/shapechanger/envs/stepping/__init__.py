@@ -1,1 +1,1 @@
-"""The fast step of ants and pendulums, bit-equal to Gymnasium's."""
+"""The fast step of ants and single pendulums, bit-equal to Gymnasium's."""

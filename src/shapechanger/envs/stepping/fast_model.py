@@ -1,12 +1,12 @@
 """Find cheaper models whose motion is bit-equal to the original model.
 
-Four parts of MuJoCo's step take time without changing any number of an ant or a pendulum:
+Four parts of MuJoCo's step take time without changing any number of an ant or a single pendulum:
 
 - **Islands.** The solver splits the constraints into islands that do not touch. One tree of bodies
   has at most one island, so skipping the search gives the same sums in the same order.
 - **Contact search.** The possible contacts of one floor and a few geoms are known beforehand.
   Explicit pairs, in the order of the search and with the parameters that it would mix, give the
-  same contacts. Margins are *summed*.
+  same contacts. The margin of a pair is the sum of its geoms' margins.
 - **Collisions** of models without possible collisions, such as a pendulum.
 - **Springs, joint friction, sensors and equalities** of a model that has none.
 
@@ -39,7 +39,7 @@ _UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhf
 def find_fast_model(
     model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
 ) -> mujoco.MjModel | None:
-    """Return a cheaper model that steps the data of a model with equal motion; None if unknown.
+    """Return a cheaper model that steps the data of a model with equal motion, or None.
 
     The model is unedited, and `make_spec` returns the spec from which it was compiled.
     """
@@ -76,8 +76,8 @@ def _with_pairs(
 ) -> mujoco.MjModel | None:
     """Return the model with all possible contacts as explicit pairs, and without a search.
 
-    Each pair must join one fixed geom with the only geom of a body: the order of the pairs then
-    follows from the order of the bodies.
+    The result is None unless all pairs join the same fixed geom with a different body each: the
+    order of the pairs then follows from the order of the bodies.
     """
     names = [model.geom(geom).name for geom in range(model.ngeom)]
     bodies, involved = model.geom_bodyid[pairs], np.unique(pairs)
@@ -123,11 +123,11 @@ _OF_CONTACTS: Final = (
 _STARTS: Final = 6
 _STEPS: Final = 8
 _SEED: Final = 20170706
-# Spread of random poses, as a fraction of a joint's range, or rad and m for a joint without limits;
-# and standard deviation of velocities, rad/s and m/s.
+# Largest shift in random poses, as a fraction of a joint's range, which is 2 rad or m for a joint
+# without limits; and standard deviation of velocities, rad/s and m/s.
 _POSE: Final = 0.5
 _SPEED: Final = 3.0
-# Depth of the trunk below the floor, so that every geom touches it, and height of a throw, m.
+# Depth of a sunk trunk below the floor, m, times the start's number; and height of a throw, m.
 _SUNK_M: Final = 0.02
 _THROWN_M: Final = 0.4
 
@@ -135,8 +135,8 @@ _THROWN_M: Final = 0.4
 def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
     """Return whether two models move equally, to the last bit, from several starts.
 
-    In some starts the trunk is thrown and turned over, in others sunk into the floor, so that geoms
-    touch it and joints reach their limits. Every pair that can collide must have touched.
+    In some starts a free trunk is thrown and turned over, in others sunk into the floor, so that
+    geoms touch it and joints reach their limits. Every pair that can collide must have touched.
     """
     rng = np.random.default_rng(_SEED)
     one, two = mujoco.MjData(model), mujoco.MjData(model)
@@ -149,7 +149,7 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
             spans = np.where(model.jnt_limited[axes], np.ptp(model.jnt_range[axes], axis=1), 2.0)
             pose[model.jnt_qposadr[axes]] += spans * rng.uniform(-_POSE, _POSE, spans.size)
             for at in model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]:
-                if start % 2:  # Sunk: every geom level with the trunk touches.
+                if start % 2:  # Sunk: every geom at the height of the trunk touches the floor.
                     pose[at + 2] = -_SUNK_M * start
                 else:
                     pose[at + 2 : at + 7] = _THROWN_M, *rng.standard_normal(4)

@@ -1,4 +1,4 @@
-"""The fast step of ants and pendulums: bit-equal to Gymnasium's, with each number computed once."""
+"""The fast step of ants and single pendulums, bit-equal to Gymnasium's."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class PausedClock:
 
 @cache
 def paused_clock() -> PausedClock | None:
-    """Return the clock that can be paused; None if a user has installed one."""
+    """Return MuJoCo's clock if it can be paused; None if a user has installed another."""
     if mujoco.get_mjcb_time() is not None:
         return None
     try:
@@ -136,7 +136,7 @@ class ModelWatch:
         self._parts = list(zip(parts, views, strict=True))
 
     def unedited(self) -> bool:
-        """Return whether every number of the model is unchanged, to the last bit."""
+        """Return whether every watched number of the model is unchanged, to the last bit."""
         if _outside(self._options) != self._numbers:
             return False
         for before, now in self._parts:  # noqa: SIM110  # `all` takes twice as long.
@@ -190,13 +190,13 @@ class Binding:
 class TunedStep(Reshapable):
     """Mixin that speeds up the step of a Gymnasium MuJoCo env, with bit-equal results.
 
-    Each step compares the public `model` with the compiled one. While it is edited, Gymnasium's own
-    methods step it. They also step if a subclass overrides one of the methods in `replaced`, or if
-    `model` has been replaced.
+    Once a fast model steps, each step checks that the public `model` is unedited; Gymnasium's own
+    methods step an edited one. They also step if `model` has been replaced or its timestep edited,
+    or if a method in `replaced` is overridden.
 
-    To step many envs together, call `ready_together` of each, set their controls, call `move` of
-    each binding, and then `conclude` once for all bindings of one `kind`. Whether a simulation has
-    diverged is in the `warnings` of its binding.
+    To step many envs together, call `ready_together` of each env and `remember` of its binding, set
+    the controls, call `move` of each binding, and then `conclude` once for all bindings of one
+    `kind`. Whether a simulation has diverged is in the `warnings` of its binding.
 
     Attributes:
         replaced: Methods and properties that `_advance` replaces; `tuned` is the class that it was

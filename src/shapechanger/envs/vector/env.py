@@ -123,7 +123,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
         Raises:
             VectorEnvError: If there are not as many seeds as envs.
-            ResetNeeded: If the mask leaves out envs that have never been reset.
+            ResetNeeded: If the mask leaves out envs before the first reset or after a failed step.
             TypeError: If the mask is not an array of booleans.
             ValueError: If the mask has another shape, or is all false.
         """
@@ -327,8 +327,8 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     def _at_home(self, work: Callable[[int], object], numbers: Iterable[int]) -> None:
         """Do `work` for some envs in the thread that owns their OpenGL contexts.
 
-        Envs whose physics step separately never draw while they step, so the caller's thread draws
-        them. Other envs may draw while they step, so their contexts belong to their own thread.
+        If the physics of all envs can be stepped separately, no env draws while it steps, and the
+        caller's thread draws them. Otherwise each env's contexts belong to its own thread.
         """
         drawn_here = self.closed or all(sub.tuned is not None for sub in self._subs)
         self._threads.do(work, numbers, alone=drawn_here)

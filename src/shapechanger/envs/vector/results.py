@@ -1,4 +1,4 @@
-"""One env of a vector env, and the results of a step of all of them."""
+"""One env of a vector env, and the results of a step of all its envs."""
 
 from __future__ import annotations
 
@@ -125,9 +125,9 @@ class SubEnv:
     """One env of a vector env, which writes its observations into a row of a batch.
 
     A simulation has diverged if the env's info has `diverged`, if MuJoCo found a position, velocity
-    or acceleration that is huge or not finite, or if an observation is not finite. MuJoCo then
-    restarts from the model's own pose. The env is terminated, the reward is 0, and the info has
-    `diverged`. Numbers of the observation that are not finite are replaced by 0.
+    or acceleration that is huge or not finite, or if an observation is not finite. The env is then
+    terminated, the reward is 0, and the info has `diverged`. Numbers of the observation that are
+    not finite are replaced by 0.
 
     Attributes:
         tuned: The env without its time limit if its physics can be stepped separately, else None.

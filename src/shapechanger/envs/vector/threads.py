@@ -1,4 +1,4 @@
-"""Threads that step the envs of a vector env; each has a fixed range of envs."""
+"""Threads that step the envs of a vector env; each has its own range of envs."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ class _Worker(threading.Thread):
 
 
 class EnvThreads:
-    """Threads that each work for a fixed range of envs, the first of which is the caller's.
+    """Threads that each work for their own range of envs; the caller's thread has the first range.
 
-    An env stays with its thread: neighbours are close in memory, and OpenGL contexts may not change
-    threads. The other threads start with the first work, and again in a forked process. A
+    Work stays with an env's thread unless `do` permits others: neighbours are close in memory, and
+    OpenGL contexts may not change threads. Threads start with the first work, also of a fork. A
     SimpleQueue stays consistent even when a signal interrupts the caller; a pair of locks does not.
 
     Attributes:
@@ -62,8 +62,8 @@ class EnvThreads:
         """Do `work` for some envs, and return when it has ended for all of them.
 
         Each env in `numbers` is done by its own thread, and each env in `anywhere` by the first
-        free thread; with `alone`, the caller's thread does all. The exception of the first env that
-        failed is raised after the work for all others, with a note that names the env.
+        free thread; with `alone`, the caller's thread does all. If envs fail, the exception of the
+        one with the lowest number is raised after all other work, with a note that names the env.
         """
         chosen, queue = list(numbers), deque(anywhere)
         parts = [chosen] if alone else [[i for i in chosen if i in part] for part in self._parts]

@@ -24,8 +24,8 @@ mjw: Any = mujoco_warp
 """The module `mujoco_warp`."""
 
 if wp.config.log_level == wp.LOG_INFO:
-    # By default Warp prints a banner and a line for each kernel that it compiles. The warning where
-    # there is no CUDA driver comes from its compiled library, whatever the level.
+    # By default Warp prints a banner and a line for each kernel that it compiles. Without a CUDA
+    # driver, its compiled library prints a warning at every level.
     wp.config.log_level = wp.LOG_ERROR
 
 

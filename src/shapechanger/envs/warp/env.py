@@ -1,4 +1,4 @@
-"""A vector env whose worlds live on one device, each with its own body."""
+"""A vector env whose worlds are on one device and may have different bodies."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ Tensors = Tensor | tuple[Tensor, ...]
 
 
 class WarpVectorEnv(VectorEnv[Any, Any, Any]):
-    """Worlds with individual bodies on one device, stepped with mujoco-warp.
+    """Worlds on one device, which may have different bodies, stepped with mujoco-warp.
 
-    Observations, rewards and ends are tensors on the device, in single precision; they follow the
-    CPU env of the same id, with its constants. Worlds whose bodies have arrays of the same shapes
-    form a batch. Where all batches have the same spaces, observations and actions are one tensor
-    with a row per world; otherwise a tuple with one tensor per batch, in the order of `batches`.
-    Rewards, ends and infos always have one number per world.
+    Observations, rewards and ends are tensors on the device, the first two in single precision.
+    They follow the CPU env of the same id, with its constants. Worlds whose bodies differ only in
+    numbers, not in structure, form a batch. Where all batches have the same spaces, observations
+    and actions are one tensor with a row per world; otherwise a tuple with one tensor per batch, in
+    the order of `batches`. Rewards, ends and infos always have one row per world.
 
     A world whose episode ends starts again in the same step (Gymnasium's autoreset mode
     `SAME_STEP`). `infos["final_obs"]` has the observations before that, and `infos["_final_obs"]`
     which worlds have ended; both are there after each step. A world whose simulation diverges is
     terminated with the reward 0, and is true in `infos["diverged"]`, which is there after each step
-    too. The other infos equal the CPU env's: per key a tensor of shape (n,), and under `_key`
-    which worlds have it.
+    too. The other infos have the CPU env's keys: per key a tensor with a row per world, and under
+    `_key` which worlds have it.
 
-    Start states have the distribution of the CPU env, but not its numbers: they depend on the seed
-    of the world and on how many episodes it has begun since then, and on nothing else. The body
-    that a world draws from a pool depends on the same two numbers.
+    Start states have the distribution of the CPU env, but not its numbers: apart from the body,
+    they depend only on the world's seed and on how many episodes it has begun since it got the
+    seed. The body that a world draws from a pool depends on the same two numbers.
 
-    A step waits for the device once, to check that actions are finite, and copies nothing to it,
-    except for `FingerTrack`. `shapechanger.make_vec` makes the env.
+    A step waits for the device to check that actions are finite, and copies nothing to it, except
+    for `FingerTrack`; every 256th step also waits to check for overflows of the memory.
 
     Args:
         reader: Compiles bodies.
@@ -69,7 +69,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         batches: The worlds, grouped by the shapes of their arrays.
         made_from: The spec of the CPU env, or None.
         max_episode_steps: Steps after which an episode is truncated; None for never.
-        episode_steps: Steps of each world's episode so far, shape (n,); it may be written.
+        episode_steps: Steps of each world's episode so far, shape (n,); callers may change it.
         observation_layout: Name, unit and range of each number of an observation of the first
             batch.
         action_layout: Name, unit and range of each number of an action of the first batch.

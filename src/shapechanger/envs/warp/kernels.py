@@ -14,8 +14,8 @@ Two private functions of mujoco-warp 4.0 differ from MuJoCo or ignore differing 
   With elliptic cones, whose friction has no direction, the two simulators agree to 1e-5.
 - **Moment arms.** mujoco-warp keeps the arms of fixed tendons, `wrap_prm`, once for all worlds.
 
-Both are replaced only in the version that the replacements were written for; a test in
-`tests/envs/warp/test_kernels.py` fails as soon as a version no longer needs one.
+Both are replaced only in the version that the replacements were written for; other versions are
+refused. A test in `tests/envs/warp/test_kernels.py` fails once a replacement is not needed.
 """
 
 # Warp reads the annotations, so they must not become strings.
@@ -70,7 +70,7 @@ def _draw(
     normal: bool,
     numbers: wp.array2d[wp.float64],
 ):
-    """Write one number of one world; normal ones by Box and Muller."""
+    """Write one number of one world; if `normal`, by the method of Box and Muller."""
     world, place = wp.tid()
     stream = wp.uint64(streams[world % streams.shape[0]])
     key = _mixed(_mixed(wp.uint64(seeds[world])) + wp.uint64(episodes[world]) * _STEP)

@@ -1,4 +1,4 @@
-"""Compile bodies, read their arrays for a device, and group bodies with equal shapes."""
+"""Compile bodies, read their arrays for a device, and group bodies that can share a batch."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
 
 
 def grouped(reader: BodyReader, bodies: Sequence[Any], num_envs: int) -> list[MakeWorlds]:
-    """Compile bodies, assign them to worlds in turn, and group worlds by the shapes of arrays.
+    """Compile bodies, assign them to worlds in turn, and group worlds that can share a batch.
 
     Return a function per group, which makes its `Worlds` from the arguments from `device` on.
     """

@@ -1,8 +1,8 @@
 """What the tasks of many worlds share: their constants, and starts that follow `StartRules`.
 
 The functions of each body are next to its env, such as `envs.ant_gpu`. If the reward formula of a
-CPU env does not read a simulation, they call it with tensors; every weight and range is read from a
-CPU env.
+CPU env does not read a simulation, they call it with tensors. Weights and ranges that an argument
+or a body can change are read from a CPU env.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Bodies read for a device, and worlds of a batch of bodies whose arrays have the same shapes."""
+"""Bodies read for a device, and the worlds of a batch, whose bodies share `DeviceBody.shared`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ARRAYS: Final = (
     *("history", "time", "xpos", "xipos", "cinert", "cvel", "cfrc_ext", "ten_length"),
     *("ten_velocity", "site_xpos", "geom_xpos", "geom_xmat"),
 )
-# Parts of the state that a restart clears, in addition to the positions.
+# Parts of the state that a restart sets to 0; it sets the positions to the start pose.
 _CLEARED: Final = ("act", "qacc_warmstart", "ctrl", "qvel", "cfrc_ext", "time")
 # Overflows of the memory for contacts and constraints, which make results wrong.
 _OVERFLOWS: Final = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
@@ -46,7 +46,7 @@ Rows = Mapping[str, NDArray[Any]]
 
 ARMS: Final = "wrap_prm"
 """Moment arms of tendons over joints, which may differ between worlds; see `kernels`."""
-# Only used for rendering, sleeping bodies and sensors, which the tasks do not have.
+# Beginnings of names of fields that only rendering, sleeping bodies and sensors use, not the tasks.
 _UNREAD: Final = (
     *("cam_", "light_", "mat_", "geom_rgba", "geom_matid", "geom_group", "site_type"),
     *("dof_length", "site_size"),
@@ -59,7 +59,7 @@ class DeviceBody(NamedTuple):
     Attributes:
         name: Its name or edits, for messages.
         shared: Numbers and arrays that all worlds of a batch have in common, as bytes.
-        rows: Arrays that may differ between worlds; those of the options begin with `opt.`.
+        rows: Arrays that may differ between worlds; names of options begin with `opt.`.
         static: Places and orientations of the geoms that never move, which the device's kinematics
             leaves as they are: `geom_xpos` (k, 3) and `geom_xmat` (k, 3, 3).
         constants: Numbers of the task that depend on the body.
@@ -121,7 +121,7 @@ def differing_arrays(one: DeviceBody, other: DeviceBody) -> list[str]:
 
 
 class Worlds(ABC):
-    """Worlds whose bodies have arrays of the same shapes, which are stepped together.
+    """Worlds that are stepped together, because their bodies have equal `DeviceBody.shared`.
 
     A subclass is a task: start, action, observation, reward and end as functions of tensors.
 
@@ -350,7 +350,7 @@ class Worlds(ABC):
         return self.observations(), self.start_infos()
 
     def _clear(self, mask: Tensor) -> None:
-        """Clear velocities, controls, warm starts and forces, as MuJoCo's own reset does."""
+        """Set the arrays in `_CLEARED` of masked worlds to 0, as MuJoCo's own reset does."""
         for view in self._cleared:
             view.masked_fill_(mask.view(-1, *[1] * (view.dim() - 1)), 0.0)
 

@@ -52,10 +52,10 @@ def film_study(
     source_policy: Path | None = None,
     shadows: bool = False,
 ) -> list[FilmStrip]:
-    """Play each arm's median seed for ten seconds, from the same start.
+    """Play each arm's median seed for up to ten seconds, and return a strip of images of each.
 
-    If `film` is a file, a film of all scenes side by side is written to it. The source policy is
-    the study's unless a file is given.
+    All are reset with the same seed. If `film` is a file, a film of all scenes side by side is
+    written to it. The source policy is the study's unless a file is given. Robots are not filmed.
     """
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []
@@ -128,7 +128,7 @@ def _scenes(study: Study, folder: Path, given: Path | None, drives: bool) -> lis
 
 
 def median_index(study: Study, kind: str) -> int:
-    """Return the index of the run with the median measure at its end."""
+    """Return the index of the run with the median final measure; 0 if a run lacks a measure."""
     values = finals(study, kind)
     if np.isnan(values).any():
         return 0
