@@ -7,7 +7,7 @@ import numpy as np
 from shapechanger.contract.env_ref import Measure
 from shapechanger.envs.own_tasks import RobotState
 
-# A dog in a plane: two legs with a hinge each, of which one is a servo.
+# A dog with a front and a back leg, each on a hinge; the front one has a motor, the other a servo.
 DOG = """
 <mujoco model="dog">
   <option timestep="0.005"/>
@@ -36,7 +36,7 @@ DOG = """
 
 
 class Rear:
-    """Lift the front."""
+    """Raise the trunk with the back leg straight."""
 
     observe = ("trunk/z", "trunk/q*", "*/angle", "*/velocity", "front/contact/fz")
     measures = (Measure("height", "m", "reward_height"),)
@@ -45,7 +45,7 @@ class Rear:
         self.weight = weight
 
     def reward(self, robot: RobotState) -> dict[str, float]:
-        """Return the height and the cost of the servo."""
+        """Return the height of the trunk, and the angle of the back leg as a cost."""
         return {"height": self.weight * robot.height, "servo": -abs(robot["back/angle"])}
 
     def terminated(self, robot: RobotState) -> bool:

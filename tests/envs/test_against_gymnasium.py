@@ -1,4 +1,4 @@
-"""Unedited bodies behave as in Gymnasium, bitwise."""
+"""Unedited bodies step as in Gymnasium, bitwise, and start with the same noise."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ def test_a_body_is_given_in_any_form(body: BodyLike) -> None:
 def test_an_invalid_body_is_refused(
     ant: Any, body: Any, error: type[Exception], sentence: str
 ) -> None:
-    """Errors at `make` and `reset` suggest the nearest name; the env does not change."""
+    """Errors at `make` and `reset` state what is wrong; the env does not change."""
     with pytest.raises(error, match=sentence):
         gym.make("shapechanger/Ant-v1", body=body)
     before = _everything(ant.unwrapped)
@@ -333,7 +333,7 @@ def test_a_custom_model_can_be_edited(tmp_path: Path) -> None:
         ("InvertedPendulum", {"frame_skip": True}, "frame_skip must be a number, got True."),
     ],
 )
-def test_an_argument_of_another_type_is_refused(
+def test_an_unknown_argument_or_one_of_another_type_is_refused(
     env_id: str, arguments: dict[str, Any], sentence: str
 ) -> None:
     """The error names the env, the argument and the expected type, or the nearest spelling."""

@@ -184,7 +184,7 @@ def test_every_target_has_an_id_and_is_compared_with_the_published_numbers() -> 
 
 @pytest.mark.parametrize("name", _CAPSULES)
 def test_shapes_equal_the_published_ones(name: str) -> None:
-    """Ends and radii to 1e-12 m; all other joints and geoms keep their sizes."""
+    """Ends and radii agree to 1e-12 m; other geoms keep their sizes, and joints their ranges."""
     model, source = _model(name), _source(name)
     for geom, (start, end, radius) in _CAPSULES[name].items():
         published = sorted([list(map(float, start)), list(map(float, end))])

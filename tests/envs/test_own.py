@@ -52,7 +52,7 @@ def _inner(env: gym.Env[Any, Any]) -> Any:
     return env.unwrapped
 
 
-def test_a_robot_walks(dog: Path) -> None:
+def test_a_file_gives_names_units_and_rewards(dog: Path) -> None:
     """Names, units and ranges follow from the model; the reward is the sum of its terms."""
     env = shapechanger.from_mjcf(dog)
     inner = _inner(env)

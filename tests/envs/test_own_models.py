@@ -110,7 +110,7 @@ def test_files_that_do_not_exist_are_named(tmp_path: Path) -> None:
     ],
 )
 def test_files_that_cannot_be_read_are_refused(tmp_path: Path, text: str, sentence: str) -> None:
-    """The message quotes MuJoCo's in one sentence."""
+    """The message quotes MuJoCo's on one line."""
     path = _written(tmp_path, "broken.xml", text)
     with pytest.raises(BrokenModel, match=sentence) as refusal:
         own_family(path).load(path)

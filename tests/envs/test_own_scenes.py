@@ -1,4 +1,4 @@
-"""A user's robots in their scenes: objects, floors, couplings and packages."""
+"""A user's robots in their scenes: objects, floors and couplings; and copies of their envs."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_range_finders_see_all_planes(tmp_path: Path) -> None:
         env.close()
 
 
-def test_coupled_fingers_start_coupled_and_stay_without_motors(tmp_path: Path) -> None:
+def test_coupled_fingers_start_coupled_and_followers_get_no_motors(tmp_path: Path) -> None:
     """The robot is an arm on a fixed base, and a box is an object that lies still."""
     box = '<body name="box" pos=".5 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>'
     scene = _FLOOR + box
@@ -153,7 +153,7 @@ def test_coupled_fingers_start_coupled_and_stay_without_motors(tmp_path: Path) -
 
 
 def test_a_base_that_slides_in_a_plane_can_walk(tmp_path: Path) -> None:
-    """The task needs no floor, and a box earlier in the file is not used as the trunk."""
+    """`walk` then needs no floor, and a box earlier in the file is not used as the trunk."""
     box = '<body name="box" pos="1 0 .1"><freejoint/><geom size=".1"/></body>'
     text = f"""
     <mujoco><worldbody>{box}

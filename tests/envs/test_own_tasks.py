@@ -66,7 +66,7 @@ def test_a_robot_has_a_height_and_the_number_of_any_name() -> None:
 
 
 def test_a_task_is_found_by_name_class_function_or_object() -> None:
-    """Classes take options; each has a name for messages."""
+    """Classes take options; each task has a name for messages."""
     walk, name = as_task("walk", {"forward": 2.0})
     assert isinstance(walk, Walk)
     assert name == "walk"
@@ -103,7 +103,7 @@ def test_a_task_that_cannot_be_made_is_refused(
 
 
 def test_a_class_of_a_module_has_a_name_that_json_can_hold() -> None:
-    """Objects, local classes and unnamed functions have no such name."""
+    """Objects and local classes have no such name."""
 
     class Local(Still):
         pass
@@ -165,7 +165,7 @@ def test_a_task_names_what_it_observes() -> None:
 
 
 def test_walking_is_rewarded_for_speed_and_health() -> None:
-    """A fallen robot is rewarded only for speed, and ends the episode unless `terminate` is off."""
+    """A fallen robot loses the term `alive`, and ends the episode unless `terminate` is off."""
     walk = Walk(forward=2.0, alive=3.0, control=0.5, least_height=0.5, least_up=0.2)
     assert walk.reward(robot()) == {"forward": 4.0, "alive": 3.0, "control": -0.5}
     assert walk.measures[0] == FORWARD_SPEED

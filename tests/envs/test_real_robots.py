@@ -55,7 +55,7 @@ _MESH: Final = r"'.+' holds '.+', a mesh, height field or SDF; only spheres"
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not FILES.is_dir(), reason="needs robot files: run `make test-robots`"),
-    # MuJoCo's compiler on files of older versions.
+    # MuJoCo's compiler warns of files for older versions.
     pytest.mark.filterwarnings("ignore:.*is deprecated:UserWarning"),
 ]
 
@@ -106,7 +106,7 @@ ROBOTS: Final = (
     _Robot(f"{_MYO}/osl/myolegs_osl.xml", no_scale=_INERTIA),
     _Robot(f"{_SUITE}/grippers/jaco_three_finger_gripper.xml", no_scale=_INERTIA),
     _Robot(f"{_SUITE}/robots/baxter/robot.xml", no_scale=_INERTIA),
-    # Its motors take 20,000 N·m, and joints without damping or armature do not bear 10 N·m.
+    # Its motors have 20,000 N·m, and its joints, without damping or armature, diverge at 10 N·m.
     _Robot(f"{_SUITE}/robots/gr1/robot.xml", no_scale=_INERTIA, no_exam=_AT_ONCE),
     _Robot(f"{_SUITE}/robots/panda/robot.xml", no_scale=_INERTIA),
     _Robot(f"{_SUITE}/robots/ur5e/robot.xml", no_scale=_INERTIA),
@@ -219,8 +219,8 @@ def test_a_robot_passes_the_exam(robot: _Robot) -> None:
 
 
 @each_robot
-def test_a_robot_can_learn(robot: _Robot) -> None:
-    """2,048 steps of PPO leave finite weights."""
+def test_a_training_on_a_robot_gives_finite_weights(robot: _Robot) -> None:
+    """The weights are finite after 2,048 steps of PPO."""
     task = f"{Move.__module__}:{Move.__qualname__}"
     arguments = {"path": str(robot.file), "task": task, "rig": to_json(robot.rig)}
     env = EnvRef("shapechanger/OwnRobot-v1", {**arguments, "max_episode_steps": 50})

@@ -223,7 +223,7 @@ def test_the_old_renderer_is_freed(ant: Any) -> None:
 
 @pytest.mark.parametrize("env_id", _SHAPES)
 def test_a_picture_shows_the_whole_body(env_id: str) -> None:
-    """At its own reach, the body fills the image without being cropped."""
+    """At its own reach, the body is large in the image and is not cropped."""
     with gym.make(env_id) as made:
         env: Any = made.unwrapped
         _without_shadows(env)
@@ -235,7 +235,7 @@ def test_a_picture_shows_the_whole_body(env_id: str) -> None:
         seen = _differs(env.picture(**_SIZE, reach=reach), picture)
     border = np.concatenate((seen[0], seen[-1], seen[:, 0], seen[:, -1]))
     assert not border.any()
-    # Some floors have a dark reflection of the body.
+    # The pixels of the body are not dark.
     assert picture[seen].mean() > 70.0
     rows = np.flatnonzero(seen.any(axis=1))
     columns = np.flatnonzero(seen.any(axis=0))
@@ -343,7 +343,7 @@ def test_a_pendulum_is_seen_whole_on_a_light_background(env_id: str) -> None:
 
 @pytest.mark.parametrize("shadows", [False, True])
 def test_floors_are_grey_and_shadows_are_not_black(shadows: bool) -> None:
-    """Gymnasium's ant walks on green tiles in frames with shadows, and its shadow is black."""
+    """In Gymnasium's frames with shadows, floors are green and shadows black; here they are not."""
     env = gym.make("shapechanger/Ant-v1", render_mode="rgb_array", shadows=shadows, **_SIZE)
     env.reset(seed=0)
     frame: Any = env.render()
@@ -397,7 +397,7 @@ def test_only_textures_differ_without_rendering() -> None:
     [(256, {}, False), (257, {}, True), (64, {"shadows": True}, True)],
 )
 def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shadows: bool) -> None:
-    """Frames of up to 256 x 256 pixels have no shadows; copies of the env render the same."""
+    """By default, frames of up to 256 x 256 pixels have no shadows; copies render the same."""
     more = {"render_mode": "rgb_array", "width": size, "height": size, **arguments}
     with gym.make("shapechanger/Ant-v1", **more) as env:
         quality = env.unwrapped.model.vis.quality

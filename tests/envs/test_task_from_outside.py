@@ -44,7 +44,7 @@ eval_episodes = 1
 
 @pytest.fixture
 def task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """Return the id of the task; its module can be imported."""
+    """Make the module of the task importable, and return `module:id` of the task."""
     (tmp_path / "high_hopper.py").write_text(_TASK)
     monkeypatch.syspath_prepend(tmp_path)
     yield "high_hopper:outside/HighHopper-v0"

@@ -36,10 +36,10 @@ def same(ours: Any, theirs: Any) -> bool:
 def step_together(
     ours: gym.Env[Any, Any], theirs: gym.Env[Any, Any], steps: int, seed: int, reach: float = 1.0
 ) -> tuple[int, int]:
-    """Step two envs with the same random actions, resetting both where an episode ends.
+    """Step two envs with the same random actions; reset both at an end and after each 400 steps.
 
     Returns:
-        Number of episodes that ended, and of steps with contacts.
+        Number of these resets, and of steps with contacts.
     """
     rng = np.random.default_rng(seed)
     shape = ours.action_space.shape

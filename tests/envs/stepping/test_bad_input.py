@@ -1,4 +1,4 @@
-"""Invalid actions, steps before a reset, and diverging simulations."""
+"""Invalid actions, steps before a reset, time limits, and diverging simulations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MuJoCo's profiling clock is paused while ants and pendulums step, and only then."""
+"""MuJoCo's profiling clock is paused while ants and single pendulums step fast, and only then."""
 
 import ctypes
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Edits of the public model take effect at the next step."""
+"""Edits of the public model take effect at the next step or reset."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_a_replaced_model_is_stepped() -> None:
     _play(envs, 10, seed=2)
 
 
-# ModelWatch.
+# Tests of `ModelWatch`.
 
 
 @pytest.mark.parametrize("name", _ARRAYS)
@@ -195,7 +195,7 @@ def _restore(model: Any, original: Any) -> None:
 
 @pytest.mark.parametrize("undone", [False, True])
 def test_a_start_keeps_within_edited_limits(undone: bool) -> None:
-    """Starts respect joint ranges that a user has edited."""
+    """Starts respect joint ranges that a user has edited, or the old ones if the edit is undone."""
     env = AntEnv(reset_noise_scale=1.0)
     env.reset(seed=0)
     before = env.model.jnt_range.copy()

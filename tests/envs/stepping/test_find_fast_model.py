@@ -184,14 +184,14 @@ def test_a_contact_filter_prevents_a_fast_model() -> None:
         lambda model: model.pair_friction.__setitem__((3, 0), 0.9),
         lambda model: model.pair_solimp.__setitem__((12, 0), 0.89),
         lambda model: model.pair_gap.__setitem__(5, 0.3),
-        lambda model: model.pair_margin.__setitem__(slice(None), 0.01),  # Margins are summed.
+        lambda model: model.pair_margin.__setitem__(slice(None), 0.01),  # One geom's margin.
         lambda model: model.body_mass.__setitem__(4, 0.1),
         lambda model: setattr(model.opt, "iterations", 1),
         lambda model: setattr(model.opt, "jacobian", mujoco.mjtJacobian.mjJAC_SPARSE),
     ],
     ids=["friction", "impedance", "gap", "margins", "mass", "iterations", "sparse"],
 )
-def test_any_difference_is_detected(change: Any) -> None:
+def test_a_model_that_moves_differently_is_detected(change: Any) -> None:
     """`moves_equally` detects differences of a pair, a body and the solver."""
     ant = AntEnv()
     fast = copy.copy(find_fast_model(ant.model, ant.body_spec))

@@ -34,7 +34,7 @@ def ants() -> Iterator[ThreadVectorEnv]:
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, None])
 def test_at_least_one_env_and_thread_are_needed(count: Any) -> None:
-    """`make_vec` and `ThreadVectorEnv` refuse numbers below one."""
+    """`make_vec` and `ThreadVectorEnv` refuse numbers that are not whole or below one."""
     with pytest.raises(VectorEnvError, match=f"at least one env, got {count}"):
         shapechanger.make_vec("Ant", count)
     with pytest.raises(VectorEnvError, match="at least one env, got 0"):
@@ -102,7 +102,7 @@ def test_bodies_must_share_their_spaces(bodies: list[Any], sentence: str) -> Non
     ],
 )
 def test_bad_arguments_are_refused(env_id: str, arguments: dict[str, Any], sentence: str) -> None:
-    """Unknown names and arguments that a backend does not have are refused."""
+    """Unknown names, wrong values, and arguments that a backend does not have are refused."""
     with pytest.raises((VectorEnvError, UnknownName, EnvArgumentError), match=sentence):
         shapechanger.make_vec(env_id, 2, **arguments)
 
@@ -134,7 +134,7 @@ def _with(place: tuple[int, ...], value: float) -> Any:
     ids=["nan", "inf", "narrow", "few", "ragged", "flat", "number", "words"],
 )
 def test_invalid_actions_are_refused(ants: ThreadVectorEnv, actions: Any, sentence: str) -> None:
-    """The error names the env, and no env has moved."""
+    """No env has moved; the error names the env of a number that is not finite."""
     before = [env.unwrapped.data.time for env in ants.envs]
     with pytest.raises(BadAction, match=sentence):
         ants.step(actions)

@@ -15,7 +15,7 @@ import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
 from shapechanger.morphology import Mass, Stretch
 
-# Bodies of each family with which worlds take turns: plain, named and edited ones.
+# Bodies of each family that worlds take in turn: plain, named and edited ones.
 BODIES: dict[str, list[Any]] = {
     "Ant": ["Ant", "BigAnt", "AmputatedAnt", [Stretch("shank_1", 1.5), Mass("torso", 1.3)]],
     "ExtendedAnt": ["ExtendedAnt", "ExtendedAnt"],
@@ -32,7 +32,7 @@ BODIES: dict[str, list[Any]] = {
 }
 
 WORLDS = 8
-# Where the exam runs, such as cuda:0.
+# Device of the worlds in `test_exam.py`, such as cuda:0.
 DEVICE = os.environ.get("SHAPECHANGER_TEST_DEVICE", "cpu")
 # Infos that a device has after each step in addition to the CPU env's.
 ALWAYS = {"final_obs", "final_info", "diverged"}

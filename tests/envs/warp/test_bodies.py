@@ -216,7 +216,7 @@ def test_a_pool_of_several_shapes_draws_within_each() -> None:
 
 
 @pytest.mark.parametrize("limit", ["njmax", "nconmax"])
-def test_too_little_memory_for_constraints_gives_a_warning(limit: str) -> None:
+def test_too_little_memory_for_contacts_or_constraints_gives_a_warning(limit: str) -> None:
     """A warning is given if an argument makes the memory too small."""
     arguments: Any = {limit: 1}
     envs = shapechanger.make_vec("Ant", 2, backend="warp", device="cpu", **arguments)

@@ -105,7 +105,7 @@ def test_worlds_without_seeds_differ() -> None:
     assert not torch.equal(one, other)
 
 
-def test_the_noise_is_uniform_and_normal() -> None:
+def test_the_noise_is_uniform_or_normal() -> None:
     """Means and variances fit the distributions; seeds and episodes are independent."""
     seeds, episodes = torch.arange(200), torch.zeros(200, dtype=torch.int64)
     flat = uniforms(seeds, episodes, 0, 500)

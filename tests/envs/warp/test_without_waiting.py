@@ -1,4 +1,4 @@
-"""A step reads one result from the device and copies no data to it."""
+"""A step reads one result from the device and copies no data to it, except for `FingerTrack`."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ def _actions(envs: Any, number: int) -> Any:
         ("FingerTrack", 2, 1, {}),
     ],
 )
-def test_a_step_does_not_wait(
+def test_a_step_waits_only_to_check_its_actions(
     name: str,
     syncs: int,
     copies: int,
     arguments: dict[str, Any],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Ends, restarts and divergence add no synchronisation, and no call mixes two devices."""
+    """Ends, restarts and divergence add no wait except for FingerTrack; no call mixes devices."""
     with fake_device(monkeypatch) as device:
         envs = shapechanger.make_vec(name, 3, backend="warp", max_episode_steps=4, **arguments)
         envs.reset(seed=0)
