@@ -8,20 +8,21 @@ Importing this package registers its ids with Gymnasium and loads neither a simu
 >>> env.unwrapped.observation_layout.names[0]
 'torso/z'
 
-The names below are the public interface; each is imported on first use and may need an extra.
+The names below are the public interface; most are imported on first use and may need an extra.
 
 - Layouts: `Layout`, `Feature`, `Element` name the numbers of observations and actions.
 - Body edits: `Stretch`, `Radius`, `Cut`, `Remove`, `Split`, `AddSegment`, `AddLimb`, `Mass`,
   `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity`,
   `StartHeight`, `PlaceBody`, `PlaceGeom`, `TotalMass`, `AddMotor`, `AddFreeJoint` and `AddFloor`
   are values; `reshape` and `compile_body` apply them, `interpolate` returns a body between two
-  bodies, `certify` lists what a shift changes. Subclass `morphology.Edit` for custom edits.
+  bodies, `certify` a `Certificate` of a shift's changes. Subclass `morphology.Edit` for your own.
 - Envs: `from_mjcf` makes an env of a custom robot and task, `make_vec` makes vector envs, and
   `examine` runs the checks that every env must pass.
 - Transfer: `BodyMap` maps observations and actions between bodies, `transplant` moves a policy's
   weights, `TransferTask`, `make_plan` and `run_study` measure the effect of transfer, `load_policy`
   and `save_policy` read and write policies.
-- Robots and demonstrations: `RobotClient`, `load_dataset`, `load_log`.
+- Robots and demonstrations: `RobotClient`, `load_dataset`, which returns a `Dataset`, `load_log`.
+- `ShapechangerError` is the base class of all exceptions of this package.
 """
 
 from __future__ import annotations
@@ -127,7 +128,7 @@ __all__ = [
 
 __version__: Final = version("shapechanger")
 
-# Modules of the public names; the others are of `morphology`.
+# Modules of the names that are imported on first use; names that are not here are in `morphology`.
 _MODULES: Final = {
     "BodyMap": "transfer",
     "Certificate": "morphology.certificate",

@@ -1,6 +1,6 @@
-"""Exceptions, whose messages state the valid names or what to do.
+"""Exceptions; most of their messages state the valid names or what to do.
 
-Each class also inherits from the corresponding builtin exception.
+Each subclass of `ShapechangerError` also inherits from a builtin exception.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class UnknownName(ShapechangerError, ValueError):
     """Unknown name.
 
     Attributes:
-        kind: Kind of name, such as "body" or "environment id".
+        kind: Kind of name, such as "body" or "environment".
         name: The name as given.
         known: The names that exist.
         instead: A sentence with advice, which ends the message; may be empty.
@@ -60,7 +60,7 @@ def require_known(kind: str, known: Collection[str], *names: object) -> None:
 
 
 class LayoutError(ShapechangerError, ValueError):
-    """Inconsistent layout."""
+    """Missing or inconsistent layout."""
 
 
 class MorphologyError(ShapechangerError, ValueError):
@@ -68,7 +68,7 @@ class MorphologyError(ShapechangerError, ValueError):
 
 
 class BrokenModel(MorphologyError):
-    """Edited model that does not compile."""
+    """Model that cannot be read or compiled."""
 
 
 class EmptyShift(MorphologyError):
@@ -80,15 +80,15 @@ class SpaceMismatch(ShapechangerError, ValueError):
 
 
 class BadAction(ShapechangerError, ValueError):
-    """Action that an env cannot take; the message names the env."""
+    """Action that an env cannot take."""
 
 
 class EnvArgumentError(ShapechangerError, ValueError):
-    """Argument of an env with the wrong type."""
+    """Argument of an env with a wrong type or value."""
 
 
 class VectorEnvError(ShapechangerError, ValueError):
-    """Vector env that cannot be made or reset as requested."""
+    """Vector env that cannot be made, reset or changed as requested."""
 
 
 class FingerError(ShapechangerError, ValueError):
@@ -96,11 +96,11 @@ class FingerError(ShapechangerError, ValueError):
 
 
 class WorldError(ShapechangerError, ValueError):
-    """World that cannot be laid out as requested."""
+    """World, or camera in it, that cannot be made as requested."""
 
 
 class TaskError(ShapechangerError, ValueError):
-    """Custom task that cannot be used; the message names it."""
+    """Task that cannot be used for a robot."""
 
 
 class PathError(ShapechangerError, ValueError):
@@ -120,7 +120,7 @@ class PolicyError(ShapechangerError, ValueError):
 
 
 class StudyError(ShapechangerError, ValueError):
-    """Study that cannot start as requested."""
+    """Study, or one of its envs or files, that cannot be used as requested."""
 
 
 class FailedRuns(StudyError):

@@ -88,7 +88,7 @@ def require_file(path: Path) -> None:
 
 
 def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
-    """Replace a file and flush it to disk; after an OutputError the old file is unchanged.
+    """Replace a file and flush it to disk; after an OutputError it is complete, old or new.
 
     `mode` sets the permissions of the new file; None keeps the old file's.
     """
@@ -114,7 +114,7 @@ def _write(path: Path, content: bytes, mode: int | None) -> None:
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     part.unlink(missing_ok=True)
     try:
-        # The file is created with its mode, so that other users can never read it.
+        # The file is created with its mode, so that other users can never read a private file.
         fd = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666 if mode is None else mode)
         with os.fdopen(fd, "wb") as file:
             if mode is not None:
@@ -148,7 +148,7 @@ def append_line(path: Path, value: Any) -> None:
 def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
     """Read a value from a file of `write_json`.
 
-    Raises CorruptStudy, whose message ends with `remedy`, if the file has other content.
+    Raises CorruptStudy, whose message ends with `remedy`, if the file cannot be read as `kind`.
     """
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind, dec_hook=from_builtins)

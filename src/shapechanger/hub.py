@@ -102,7 +102,7 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
 
     `card` describes the files, in Markdown; the card and the list are added to the folder. A
     repository, such as "ada/ant", is created if it does not exist, and only its owner can read it
-    unless it is `public`. Raises HubError if it contains other files.
+    unless it is `public`. Raises HubError if it contains files but no list.
     """
     repo_type = _TYPES[kind]
     files = {

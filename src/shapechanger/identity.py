@@ -97,9 +97,9 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> Identity:
 
 
 def identify_code(names: Iterable[str], *objects: Any) -> Identity:
-    """Return the identity of a part without a model, which consists of its modules.
+    """Return the identity of a part without a model: the hashes of its custom modules.
 
-    They define the objects, or are named in texts such as `my_methods:warm-start`.
+    The modules define `objects`, or are named in `names`, as in `my_methods:warm-start`.
     """
     return Identity(files=own_modules({*named_modules(names), *modules_of(*objects)}))
 
@@ -196,7 +196,7 @@ def _is_own(path: Path) -> bool:
 
 
 def _file_of(name: str) -> Path | None:
-    """Return the file of a module, whether or not it is imported; None if it has no file."""
+    """Return the file of an imported module or of a custom one; None if it has no file."""
     file = getattr(sys.modules.get(name), "__file__", None)
     if name not in sys.modules:
         # Unlike `importlib.util.find_spec`, this does not import the parent packages.

@@ -37,7 +37,7 @@ STEERING: Final = ("steering", "throttle")
 """Names of the values of an action if the policy has no action layout."""
 
 MAX_BYTES: Final = 2**28
-"""Size of the largest file that is read."""
+"""Size of the largest file that is read, bytes."""
 
 _CARD: Final = "card"
 _HASH: Final = "sha256"
@@ -288,7 +288,7 @@ def load_policy(path: str | PathLike[str], algorithm: str = "") -> Any:
             sb3-contrib or a module that is already imported.
 
     Raises:
-        PolicyError: If the file is missing, is not a policy, or has been changed.
+        PolicyError: If the file is missing, is not a policy, or does not match its hash.
         MissingExtra: If a package that this kind of policy needs is not installed.
     """
     file = Path(path)

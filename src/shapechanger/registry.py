@@ -121,7 +121,7 @@ POLICIES: Final = Registry(
 ROBOTS: Final = Registry(
     "reader of robots", "shapechanger.robots", {"profile": "vehicles.twin:read_robot"}
 )
-"""Functions that read a robot for its simulation, so that simulations do not import robots."""
+"""Functions that read a robot for its simulation; simulations need not import `robot` for it."""
 
 MODELS: Final = Registry(
     "kind of model", "shapechanger.models", {"mujoco": "morphology.certificate.changes"}

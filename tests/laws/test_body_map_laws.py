@@ -161,7 +161,7 @@ def test_json_round_trip(built: BodyMap) -> None:
 @law
 @given(legs=st.integers(1, 4), flip=st.booleans(), order=st.randoms(use_true_random=False))
 def test_a_mirror_is_its_own_inverse(legs: int, flip: bool, order: object) -> None:
-    """The order of the features does not matter."""
+    """Mirroring twice is the identity, in any order of the features."""
     names = [f"torso/{q}" for q in ("y", "qw", "qx", "qy", "qz", "vx", "vy", "wx", "wy", "wz")]
     names += [
         f"{joint}_{side}{leg}/{quantity}"

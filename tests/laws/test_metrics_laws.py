@@ -37,7 +37,7 @@ differences = pytest.mark.parametrize("difference", DIFFERENCES.values(), ids=DI
 
 law = settings(max_examples=40)
 
-# Returns from rounding noise to a few thousand, as for simulated robots.
+# Returns of a few units, and of up to 10,000, as for simulated robots.
 heights = st.floats(-5.0, 5.0) | st.floats(-1e4, 1e4)
 source_steps = st.just(0) | st.integers(0, 2000)
 
@@ -63,7 +63,7 @@ def value(estimate: Estimate) -> float:
 def summary_of(
     arm: LearningCurves, scratch: LearningCurves, reference: Reference, source: float
 ) -> Summary:
-    """Summarise with few resamples and a fixed seed."""
+    """Summarise with a fixed seed and only the last evaluation."""
     return summarise(
         scratch, arm, reference, source_steps=source, rng=np.random.default_rng(0), last_k=1
     )

@@ -284,7 +284,7 @@ _BODIES = st.lists(st.sampled_from(_KINDS).flatmap(_edits), max_size=3).map(tupl
 @given(data=st.data())
 @pytest.mark.parametrize("kind", _KINDS)
 def test_edits_round_trip_through_json(kind: type[Edit], data: st.DataObject) -> None:
-    """For each kind of edit, with any values and amounts."""
+    """Each kind of edit, with any values and amounts, is equal after it is written and read."""
     edit = data.draw(_edits(kind))
     text = to_json([edit])
     assert from_json(text) == (edit,) == as_body(text)

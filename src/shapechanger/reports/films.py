@@ -36,7 +36,7 @@ def write_film(frames: list[NDArray[Any]], path: Path, fps: float) -> None:
 
 
 def write_picture(content: Any, path: Path, **options: Any) -> None:
-    """Write an image of shape (height, width, 3) in the format of the file's suffix."""
+    """Write an image, (height, width, 3), or the frames of a film, in the format of the suffix."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         cast("Any", iio).imwrite(path, content, **options)

@@ -57,7 +57,7 @@ def interval_text(
 
 
 def list_text(values: Sequence[float]) -> str:
-    """Format several numbers with the same decimals, enough to distinguish them."""
+    """Format several numbers with the same decimals, which show three digits of their range."""
     decimals = _decimals(max(values) - min(values), 3)
     return "; ".join(number(value, decimals) for value in values)
 
