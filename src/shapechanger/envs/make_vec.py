@@ -64,11 +64,12 @@ def make_vec(
     copy: bool = True,
     **arguments: Any,
 ) -> ThreadVectorEnv | WarpVectorEnv:
-    """Make a vector env of one id; `gymnasium.make_vec` makes the same for families and files.
+    """Make a vector env of one id.
 
     Args:
         env_id: A registered id, or a name of the catalogue, such as `BigAnt`. Envs of other
-            classes must not share mutable state, because they step in threads.
+            classes must not share mutable state, because they step in threads. For an env of a body
+            family or of a robot's file, `gymnasium.make_vec` makes the same vector env.
         num_envs: How many envs.
         backend: `threads` steps CPU envs with a few threads; `warp` steps worlds on a device, with
             tensors as results (see `shapechanger.envs.warp.WarpVectorEnv`).

@@ -51,8 +51,9 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     they depend only on the world's seed and on how many episodes it has begun since it got the
     seed. The body that a world draws from a pool depends on the same two numbers.
 
-    A step waits for the device to check that actions are finite, and copies nothing to it, except
-    for `FingerTrack`; every 256th step also waits to check for overflows of the memory.
+    A step waits for the device to check that actions are finite, and copies at most these to it,
+    except for `FingerTrack`; every 256th step also waits to check for overflows of the memory.
+    `shapechanger.make_vec` makes the env.
 
     Args:
         reader: Compiles bodies.
