@@ -106,7 +106,7 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
         ("train Ant --learner ppo-rum", "Did you mean 'ppo-run'?"),
         ("train Ant --steps 10", "A budget of 10 steps is too small"),
         ("transfer Ant ExtendedAnt --rule foot_1", "NAME=RULE"),
-        ("transfer Ant ExtendedAnt --map none.toml", "cannot be read"),
+        ("transfer Ant ExtendedAnt --map none.toml", "No body map matches 'none.toml'"),
         ("transfer Ant BigAnt --workers 0", "at least one worker"),
         ("transfer Ant BigAnt --arms scratch identified", "can adapt the source"),
         ("train Ant --set learning_rate", "NAME=VALUE"),

@@ -41,7 +41,7 @@ def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
             "line 3: No key in targets matches 'bdy'. Did you mean 'body'? There are: env, name,",
         ),
         ("\nseeds = 'many'\n", "line 2: Expected `int`, got `str`"),
-        ("envs = [", "is not valid TOML"),
+        ("envs = [", "cannot be read"),
         ("envs = ['Ant']\nsources = ['Ant']\ntargets = ['BigAnt']\n", "in one way"),
         ("envs = ['Ant',\n'Bigant', 'Hopper']\n", "mine.toml, line 2: No env"),
         ("pairs = [['Ant', {env = 'Ant', body = 'BigAnt'}], ['Ant', 'Ant']]", "called Ant-to-Ant"),
