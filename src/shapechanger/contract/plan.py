@@ -59,7 +59,7 @@ class ActionPlan:
     unit: Literal["1", "deg", "rad", "m", "m/s", "N", "N·m"] = "1"
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
 
-    def mistakes(self) -> Iterator[tuple[str, str]]:
+    def contradictions(self) -> Iterator[tuple[str, str]]:
         """Yield each key that contradicts other keys, and the end of a sentence about it."""
         if self.one_sided and self.low < 0.0:
             yield "low", "must be 0 to 1, because it is one-sided"

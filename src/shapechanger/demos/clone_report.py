@@ -132,8 +132,8 @@ def calibration_chart(bins: tuple[Bin, ...]) -> str:
 
     def draw(_: Figure, axes: Axes) -> None:
         axes.plot([0, 1], [0, 1], **_DIAGONAL)
-        sure, right = [b.confidence for b in bins], [b.accuracy for b in bins]
-        axes.plot(sure, right, color=BLUE, marker="o", linewidth=1.5)
+        confidences, accuracies = [b.confidence for b in bins], [b.accuracy for b in bins]
+        axes.plot(confidences, accuracies, color=BLUE, marker="o", linewidth=1.5)
         for one in bins:
             at = (one.confidence, one.accuracy)
             axes.annotate(str(one.steps), at, (4, -12), textcoords="offset points")

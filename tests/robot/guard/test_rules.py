@@ -316,7 +316,7 @@ def test_no_stall_is_detected(throttle: float, done: float, speeds: tuple[float,
     robot = _driving()
     for number in range(40):
         assert robot.ask(throttle) == (throttle, "")
-        robot.rules.learn((0.5, done))
+        robot.rules.set_applied((0.5, done))
         assert robot.sense(speed=speeds[number % len(speeds)])["stall"] == 0.0
         robot.wait(100)
     assert robot.sense() == {}

@@ -226,20 +226,20 @@ def macro_f1(
     """
     scores: list[float] = []
     for one in np.union1d(predicted, truth) if absurd is None else np.unique(truth):
-        chosen, right = predicted == one, truth == one
+        chosen, true = predicted == one, truth == one
         taken = chosen if absurd is None else chosen | absurd
-        scores.append(2.0 * float((chosen & right).sum()) / float(taken.sum() + right.sum()))
+        scores.append(2.0 * float((chosen & true).sum()) / float(taken.sum() + true.sum()))
     return float(np.mean(scores))
 
 
 def _calibration(
-    out: NDArray[np.float32], right: NDArray[np.bool_]
+    out: NDArray[np.float32], correct: NDArray[np.bool_]
 ) -> tuple[tuple[Bin, ...], float]:
     """Return the non-empty bins, and the expected calibration error."""
-    sure = out.max(axis=1)
-    places = np.minimum((sure * _BINS).astype(np.int64), _BINS - 1)
+    confidence = out.max(axis=1)
+    places = np.minimum((confidence * _BINS).astype(np.int64), _BINS - 1)
     bins = tuple(
-        Bin(float(sure[inside].mean()), float(right[inside].mean()), int(inside.sum()))
+        Bin(float(confidence[inside].mean()), float(correct[inside].mean()), int(inside.sum()))
         for inside in (places == place for place in range(_BINS))
         if inside.any()
     )

@@ -189,7 +189,7 @@ class Guard:
                 self._outputs.release()
             else:
                 actions, text = self._outputs.write(decision.actions, now_ns)
-                self._rules.learn(actions)
+                self._rules.set_applied(actions)
                 reason = decision.stop_reason
                 if decision.seq is not None:  # In a stop, an output that deviates is only late.
                     reason = f"{reason} {text}".strip()

@@ -23,7 +23,7 @@ from shapechanger.robot.guard.sensors import Sensing
 _BELIEVED_AFTER_S = 0.5
 
 
-class Persistence:
+class Debounce:
     """Condition that counts once it has held for `for_s` seconds without interruption."""
 
     def __init__(self, for_s: float) -> None:
@@ -59,8 +59,8 @@ class RobotHealth:
             "temperature": limits.high_temperature_c > 0.0,
         }
         self._protecting = tuple(s.name for s in plan.sensors if needed.get(s.measures))
-        self._low = Persistence(_BELIEVED_AFTER_S)
-        self._hot = Persistence(_BELIEVED_AFTER_S)
+        self._low = Debounce(_BELIEVED_AFTER_S)
+        self._hot = Debounce(_BELIEVED_AFTER_S)
         self._is_low = False
         self._battery = ""
         self._others: tuple[str, ...] = ()
@@ -293,7 +293,7 @@ class Rules:
         """Return whether `tick` would stop the robot or keep it at rest now."""
         return self._reason(now_ns) != ""
 
-    def learn(self, done: tuple[float, ...]) -> None:
+    def set_applied(self, done: tuple[float, ...]) -> None:
         """Update with the value of each action that the outputs applied after `tick`."""
         self._done = done
 

@@ -190,7 +190,7 @@ def _read_action(table: Table) -> ActionPlan:
     (action,) = table.decode(ActionPlan, given={"name": table.place[-1]})
     if "low" not in table.keys and action.one_sided:
         action = replace(action, low=0.0)
-    for key, text in action.mistakes():
+    for key, text in action.contradictions():
         raise table.refused(key, text)
     return action
 
