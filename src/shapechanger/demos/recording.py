@@ -172,11 +172,13 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         spec, inner, layout = self.env.spec, self.env.unwrapped, self._encoder.state_layout
         kwargs = dict(spec.kwargs) if spec else {}
         kwargs.pop("key", None)  # A secret.
-        robot = getattr(inner, "welcome", None)  # Only envs of robots on the network have it.
-        facts = ("robot", "body", "camera_pitch_deg", "camera_fovy_deg")
+        robot = getattr(inner, "welcome", None)  # Envs of robots, also of simulated ones, have it.
+        pitch_deg, fovy_deg = getattr(robot, "camera_deg", (None, None))
         has_clock = self._seen["captured_ns"] is not None
         fields: dict[str, Any] = {
-            **{name: getattr(robot, name) for name in facts if hasattr(robot, name)},
+            **{name: getattr(robot, name, "") for name in ("robot", "body")},
+            "camera_pitch_deg": pitch_deg,
+            "camera_fovy_deg": fovy_deg,
             "action_layout": self._encoder.action_layout,
             "state_layout": layout or Layout(()),
             "image_size": picture_size(self._jpeg, "from the env") if self._jpeg else None,
