@@ -255,14 +255,14 @@ def check_seed(
     return number
 
 
-def no_policy_file(path: Path, words: Iterable[str] = (), what: str = "file") -> str:
+def no_policy_file(path: Path, names: Iterable[str] = (), noun: str = "file") -> str:
     """Return the message about a missing policy file, with the most similar name in its folder.
 
     Args:
         path: The missing file.
-        words: Names that are valid instead of a file, such as "reference".
-        what: Noun for the path: "file", or "file or folder".
+        names: Names that are valid instead of a file, such as "reference".
+        noun: Noun for the path: "file", or "file or folder".
     """
     siblings = (str(each) for each in path.parent.glob(f"*{glob.escape(path.suffix)}"))
-    close = difflib.get_close_matches(str(path), [*words, *sorted(siblings)], n=1)
-    return f"There is no policy {what} {path}" + (f"; did you mean {close[0]}?" if close else ".")
+    close = difflib.get_close_matches(str(path), [*names, *sorted(siblings)], n=1)
+    return f"There is no policy {noun} {path}" + (f"; did you mean {close[0]}?" if close else ".")

@@ -179,18 +179,18 @@ def decoded(text: str | bytes, kind: type[_T], error: type[ShapechangerError], f
         raise error(f"{failure}: {str(cause).rstrip('.')}.") from cause
 
 
-def read_toml(path: Path, what: str, known: Iterable[str]) -> tuple[str, dict[str, Any]]:
+def read_toml(path: Path, kind: str, known: Iterable[str]) -> tuple[str, dict[str, Any]]:
     """Return the text of a user's TOML file, and its content.
 
-    `what` names the kind of file in errors, and `known` has the names that exist without a file.
+    `kind` names the kind of file in errors, and `known` has the names that exist without a file.
     """
     try:
         text = read_text(path)
         return text, tomllib.loads(text)
     except FileNotFoundError:
-        raise UnknownName(what, str(path), known) from None
+        raise UnknownName(kind, str(path), known) from None
     except (OSError, ValueError) as error:  # TOMLDecodeError is a ValueError.
-        raise StudyError(f"The {what} {path} cannot be read: {error}.") from error
+        raise StudyError(f"The {kind} {path} cannot be read: {error}.") from error
 
 
 @contextmanager

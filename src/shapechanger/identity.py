@@ -64,11 +64,11 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
         Models are compared only if both identities have a model.
         """
 
-        def changed(what: str, old: str, new: str) -> Iterator[str]:
+        def changed(part: str, old: str, new: str) -> Iterator[str]:
             if old and new and old != new:
-                yield f"{what} has changed from {old} to {new}"
+                yield f"{part} has changed from {old} to {new}"
             elif old != new:
-                yield f"{what} is gone (was {old})" if old else f"{what} is new ({new})"
+                yield f"{part} is gone (was {old})" if old else f"{part} is new ({new})"
 
         found: list[str] = []
         if self.model and other.model:

@@ -219,8 +219,8 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def _text(layout: Layout | None) -> str:
-    words = (f"{f}{f' x {f.shape}' if f.shape else ''}" for f in layout or ())
-    return ", ".join(words) or "none"
+    features = (f"{f}{f' x {f.shape}' if f.shape else ''}" for f in layout or ())
+    return ", ".join(features) or "none"
 
 
 class Policy(ABC):

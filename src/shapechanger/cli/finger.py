@@ -62,7 +62,7 @@ class FingerIdentify:
             log = dataclasses.replace(log, motors=shipped_rig())
         for path in files:
             require_file(path)
-        found = identify(log, lambda words: say(f"{words} …", stderr=True))
+        found = identify(log, lambda text: say(f"{text} …", stderr=True))
         write_atomic(page, finger_html(found, self.log.name).encode())
         if self.out is not None:
             write_atomic(self.out, found.parameters.to_json().encode())

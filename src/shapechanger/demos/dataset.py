@@ -132,7 +132,7 @@ def load_dataset(
         kind = {"actions": part.action_layout, "states": part.state_layout}
         kind |= {"pictures": (header.image_size, part.pictures is None)}
         first = first or (name, kind)
-        other = [what for what, value in kind.items() if first[1][what] != value]
+        other = [name for name, value in kind.items() if first[1][name] != value]
         parts.append(part)
         periods_s += periods
         if not is_same_rate(header.control_hz, parts[0].control_hz):

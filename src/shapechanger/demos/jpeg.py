@@ -60,8 +60,11 @@ def _decoded(function: str, jpeg: bytes, name: str, **options: str) -> Any:
     try:
         return getattr(_simplejpeg(), function)(jpeg, **options)
     except ValueError as error:
-        what = f"is not a JPEG, or is damaged ({error})" if jpeg else "is empty"
-        raise DemosError(f"The image {name} {what}: {_REMEDY}.") from error
+        if not jpeg:
+            raise DemosError(f"The image {name} is empty: {_REMEDY}.") from error
+        raise DemosError(
+            f"The image {name} is not a JPEG, or is damaged ({error}): {_REMEDY}."
+        ) from error
 
 
 def _simplejpeg() -> Any:

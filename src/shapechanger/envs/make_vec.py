@@ -170,9 +170,9 @@ def _cores() -> int:
     return os.cpu_count() or 1  # pragma: no cover  # Not Linux.
 
 
-def _at_least_one(what: str, number: int) -> int:
+def _at_least_one(noun: str, number: int) -> int:
     if not hasattr(number, "__index__") or operator.index(number) < 1:
-        raise VectorEnvError(f"A vector env needs at least one {what}, got {number!r}.")
+        raise VectorEnvError(f"A vector env needs at least one {noun}, got {number!r}.")
     return operator.index(number)
 
 

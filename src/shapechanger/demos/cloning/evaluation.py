@@ -49,8 +49,8 @@ def tercile_classes(
     parts = [name for feature in layout for name in [feature.name] * feature.size]
 
     def word(name: str, place: int) -> str:
-        words = _WORDS.get(name.split("/")[-1])
-        return words[place] if words else f"{name} {_PLACES[place]}"
+        names = _WORDS.get(name.split("/")[-1])
+        return names[place] if names else f"{name} {_PLACES[place]}"
 
     names = [
         OUT_OF_RANGE if row[0] < 0 else " ".join(map(word, parts, row.tolist())) for row in found

@@ -114,8 +114,8 @@ class _Dataset:
             "dataset_from_index": self.steps,
             "dataset_to_index": self.steps + count,
         }
-        for what in ("data", "meta/episodes"):
-            place |= {f"{what}/chunk_index": 0, f"{what}/file_index": 0}
+        for part in ("data", "meta/episodes"):
+            place |= {f"{part}/chunk_index": 0, f"{part}/file_index": 0}
         if video is not None:
             part = dict[str, float](chunk_index=0, file_index=len(self._videos) - 1)
             part["from_timestamp"] = float((video.frames - count) / self._rate)

@@ -141,8 +141,8 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     limb_of_body = {body: i for i, limb in enumerate(tree.limbs) for body in limb.bodies}
     found = [_column(each, limb_of, limb_of_body, tree.trunk) for each in observation.features]
     columns = Columns(
-        tuple(dict.fromkeys(what for row, what in found if row == 0)),
-        tuple(dict.fromkeys(what for row, what in found if row > 0)),
+        tuple(dict.fromkeys(name for row, name in found if row == 0)),
+        tuple(dict.fromkeys(name for row, name in found if row > 0)),
         tree.trunk_numbers,
         tree.limb_numbers,
     )

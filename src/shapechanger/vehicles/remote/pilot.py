@@ -77,7 +77,7 @@ def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
 def require_policies(path: Path, robot: RobotCard) -> None:
     """Raise PolicyError unless the policy, or each policy of the folder, at `path` fits a robot."""
     if not path.exists():
-        raise PolicyError(no_policy_file(path, what="file or folder"))
+        raise PolicyError(no_policy_file(path, noun="file or folder"))
     files = [path] if path.suffix == ENDING else []
     if path.is_dir():
         files = [path / f"{name}{ENDING}" for name in policies_in(path)]
