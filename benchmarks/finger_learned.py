@@ -23,6 +23,7 @@ from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.files import write_atomic
 from shapechanger.finger.gap import GAPS
+from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners.evaluation import Evaluation
@@ -86,12 +87,24 @@ def learned() -> list[Row]:
         list(pool.map(trained, *zip(*wanted, strict=True)))
     curves = {f"{name}-{seed}": json.loads(_curve(name, seed).read_text()) for name, seed in wanted}
     write_atomic(CURVES, (json.dumps(curves, indent=1) + "\n").encode())
-    return [_reach_row(seeds), _track_row(seeds)]
+    reach, track = ([_file(name, seed) for seed in seeds] for name in ("reach", "track"))
+    return [
+        _reach_row(f"learned reaching, {len(seeds)} seeds", reach),
+        _track_row(f"learned following, {len(seeds)} seeds", track),
+    ]
+
+
+def shipped() -> list[Row]:
+    """Evaluate the shipped policies on unseen targets."""
+    return [
+        _reach_row("shipped policy that reaches", [POLICIES["reach"]]),
+        _track_row("shipped policy that follows", [POLICIES["track"]]),
+    ]
 
 
 def trained(name: str, seed: int) -> Path:
     """Return the file of a policy; train it if it does not exist."""
-    out = FOLDER / f"{name}-{seed}.safetensors"
+    out = _file(name, seed)
     if out.exists():
         return out
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -108,20 +121,23 @@ def trained(name: str, seed: int) -> Path:
     return out
 
 
+def _file(name: str, seed: int) -> Path:
+    return FOLDER / f"{name}-{seed}.safetensors"
+
+
 def _curve(name: str, seed: int) -> Path:
     return FOLDER / f"{name}-{seed}.json"
 
 
-def _reach_row(seeds: range) -> Row:
+def _reach_row(label: str, policies: list[Path]) -> Row:
     shares: list[float] = []
     errors: list[float] = []
-    for seed in seeds:
-        policy = load_policy(FOLDER / f"reach-{seed}.safetensors")
-        infos = played(policy, TASKS["reach"].env, TARGETS)
+    for policy in policies:
+        infos = played(load_policy(policy), TASKS["reach"].env, TARGETS)
         shares.append(float(np.mean([info["is_success"] for info in infos])))
         errors.append(1e3 * float(np.median([info["distance"] for info in infos])))
     return Row(
-        f"learned reaching, {len(shares)} seeds: targets reached within 5 mm",
+        f"{label}: targets reached within 5 mm",
         f"{np.mean(shares):.1%}",
         f"{min(shares):.1%} to {max(shares):.1%} of {TARGETS}, median errors "
         f"{min(errors):.2f} to {max(errors):.2f} mm, {TASKS['reach'].steps:,} steps",
@@ -130,26 +146,22 @@ def _reach_row(seeds: range) -> Row:
     )
 
 
-def _track_row(seeds: range) -> Row:
+def _track_row(label: str, policies: list[Path]) -> Row:
     env = EnvRef("shapechanger/FingerTrack-v1", {"path": CIRCLE})
     errors = [
-        1e3 * float(np.mean([info["rms"] for info in played(_tracker(seed), env, TRACKS)]))
-        for seed in seeds
+        1e3 * float(np.mean([info["rms"] for info in played(load_policy(policy), env, TRACKS)]))
+        for policy in policies
     ]
     knows = float(np.mean([tracked_mm(0.5, FIRST_SEED + i) for i in range(TRACKS)]))
     ratios = [error / knows for error in errors]
     return Row(
-        f"learned following, {len(errors)} seeds: circle of 12 mm at 0.5 Hz",
+        f"{label}: circle of 12 mm at 0.5 Hz",
         f"{np.mean(errors):.2f} mm RMS, {np.mean(ratios):.2f}x",
         f"{min(ratios):.2f}x to {max(ratios):.2f}x of {knows:.2f} mm, "
         f"{TASKS['track'].steps:,} steps on other paths",
         "2x of the controller that knows the finger",
         max(ratios) <= 2.0,
     )
-
-
-def _tracker(seed: int) -> TrainedPolicy:
-    return load_policy(FOLDER / f"track-{seed}.safetensors")
 
 
 def played(

@@ -65,6 +65,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "finger-oracle": _suite("finger_oracle", "oracle"),
     "finger-speed": _suite("finger_speed", "against_myosuite"),
     "finger-learned": _suite("finger_learned", "learned"),
+    "finger-shipped": _suite("finger_learned", "shipped"),
     "finger-identify": _suite("finger_identify", "identified"),
     "gpu": _suite("gpu", "gpu"),
     "gpu-on-cpu": _suite("gpu", "on_cpu"),

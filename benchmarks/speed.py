@@ -6,24 +6,31 @@ order, and give one ratio of CPU times. Resets are not included.
 
 from __future__ import annotations
 
+import copy
 import statistics
 import time
 from collections.abc import Callable
 from typing import Any, Final
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.row import Row
 from shapechanger.envs.stepping.fast_model import find_fast_model
+from shapechanger.envs.stepping.tuned import ModelWatch, paused_clock
 
 ROUNDS: Final = 41
 # Env steps per round: about 30 ms for either env.
 ANT_STEPS: Final = 100
 PENDULUM_STEPS: Final = 1000
+# Simulation steps of one step of an ant.
+ANT_SKIP: Final = 5
 # More than the steps after which an env searches for a faster model.
 WARM_UP: Final = 600
+# Checks of a model per round.
+CHECKS: Final = 200
 FRAMES: Final = 60
 SLOW_FRAMES: Final = 8
 SIZE: Final[dict[str, Any]] = {"width": 128, "height": 128}
@@ -32,7 +39,7 @@ _GENTLE: Final = 0.05
 
 
 def single() -> list[Row]:
-    """Compare single envs: steps, resets, frames and the search for a fast model."""
+    """Compare single envs: steps, resets, each trick of a step, the search for one, and frames."""
     ant, ant_reset = _compared("Ant", ANT_STEPS, 1.0)
     pole, pole_reset = _compared("InvertedPendulum", PENDULUM_STEPS, _GENTLE)
     stock, _ = _compared("Ant", ANT_STEPS, 1.0, fast_model=False)
@@ -44,6 +51,7 @@ def single() -> list[Row]:
         _ratio_row("the same with fast_model=False", plain_pole, None),
         _ratio_row("one Ant-v1 reset against Ant-v5, CPU time", ant_reset, None),
         _ratio_row("one InvertedPendulum-v1 reset, for comparison", pole_reset, None),
+        *_trick_rows(),
         _search_row(),
         *_frame_rows(),
     ]
@@ -117,6 +125,82 @@ def _ratio_row(name: str, ratios: list[float], target: float | None) -> Row:
         "none" if target is None else f">= {target:g}x",
         target is None or median >= target,
     )
+
+
+def _trick_rows() -> list[Row]:
+    """Return what each trick of an ant's step gains by itself."""
+    clock = paused_clock()
+    assert clock is not None, "A clock of a user is installed."
+    with gym.make("shapechanger/Ant-v1") as env:
+        inner: Any = env.unwrapped
+        model = inner.model
+        fast = find_fast_model(model, inner.body_spec)
+    assert fast is not None
+    flagged = copy.copy(model)
+    flagged.opt.disableflags = fast.opt.disableflags
+    plain, flags, pairs, paused = (
+        _physics(model, _mj_step),
+        _physics(flagged, _mj_step),
+        _physics(fast, _mj_step),
+        _physics(fast, clock.step),
+    )
+    watch = ModelWatch(model)
+    arrays = [
+        (getattr(owner, name).copy(), getattr(owner, name))
+        for owner in (model, model.opt, model.stat)
+        for name in dir(owner)
+        if type(getattr(owner, name)) is np.ndarray and name != "tex_data"
+    ]
+
+    def by_memory(_: int) -> float:
+        return _cpu_s(lambda: [watch.unedited() for _ in range(CHECKS)])
+
+    def by_arrays(_: int) -> float:
+        return _cpu_s(lambda: [all(np.array_equal(*two) for two in arrays) for _ in range(CHECKS)])
+
+    return [
+        _ratio_row("physics of Ant: MuJoCo's flags alone", _ratios(plain, flags), None),
+        _ratio_row(
+            "physics of Ant: contact pairs on top of the flags", _ratios(flags, pairs), None
+        ),
+        _ratio_row("physics of Ant: a paused clock on top of both", _ratios(pairs, paused), None),
+        _ratio_row(
+            "check of Ant's model: memory instead of arrays", _ratios(by_arrays, by_memory), None
+        ),
+    ]
+
+
+def _ratios(slow: Callable[[int], float], quick: Callable[[int], float]) -> list[float]:
+    """Return the ratios of two CPU times in paired rounds, sorted; both get the round's number."""
+    found: list[float] = []
+    for number in range(-1, ROUNDS):
+        pair = (slow, quick) if number % 2 else (quick, slow)
+        took = {work: work(number + 1) for work in pair}
+        found.append(took[slow] / took[quick])
+    return sorted(found[1:])  # The first warms up.
+
+
+def _physics(
+    model: mujoco.MjModel, step: Callable[[mujoco.MjModel, mujoco.MjData, int], None]
+) -> Callable[[int], float]:
+    """Return a function of a seed that returns the CPU time of an episode's physics, s."""
+    data = mujoco.MjData(model)
+
+    def episode(seed: int) -> float:
+        mujoco.mj_resetData(model, data)
+        actions = np.random.default_rng(seed).uniform(-1.0, 1.0, (ANT_STEPS, model.nu))
+        began = time.thread_time()
+        for action in actions:
+            data.ctrl[:] = action
+            step(model, data, ANT_SKIP)
+        return time.thread_time() - began
+
+    return episode
+
+
+def _mj_step(model: mujoco.MjModel, data: mujoco.MjData, frame_skip: int) -> None:
+    mujoco.mj_step(model, data, frame_skip)
+    mujoco.mj_rnePostConstraint(model, data)
 
 
 def _search_row() -> Row:

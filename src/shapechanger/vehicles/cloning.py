@@ -2,10 +2,10 @@
 
 `CloneLearner` records an env's demonstrator, and evaluates a clone at each budget. `train_student`
 learns from a teacher, a policy that observes distances, speed and rate of turn, and is trained by
-reinforcement learning in two minutes. First the teacher drives, and the student clones it from
-images alone (D. Chen et al., "Learning by Cheating", CoRL 2019). Then the student drives, and its
-images are labelled with the teacher's actions (S. Ross et al., "A Reduction of Imitation Learning
-and Structured Prediction to No-Regret Online Learning", AISTATS 2011).
+reinforcement learning. First the teacher drives, and the student clones it from images alone (D.
+Chen et al., "Learning by Cheating", CoRL 2019). Then the student drives, and its images are
+labelled with the teacher's actions (S. Ross et al., "A Reduction of Imitation Learning and
+Structured Prediction to No-Regret Online Learning", AISTATS 2011).
 """
 
 from __future__ import annotations

@@ -294,11 +294,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def send_lifeline(guard_fd: int) -> None:
     """Send the guard a descriptor that closes as soon as this process dies.
 
-    When a process is killed, the kernel frees its memory before it closes its files. For the
-    daemon's 50 MB that takes 6 ms, in which the guard would wait for the end of the socket. If a
-    thread has a separate table of files, its files are closed at once. Such a thread holds one end
-    of a pipe, and the guard holds the other end. `python -m benchmarks.run robot-faults` measures
-    0.5 ms instead of 7 ms.
+    When a process is killed, the kernel frees its memory before it closes its files, and the guard
+    would wait for the end of the socket for as long. If a thread has a separate table of files, its
+    files are closed at once. Such a thread holds one end of a pipe, and the guard holds the other
+    end. `python -m benchmarks.run robot-faults` measures how soon the motors rest.
 
     If the system permits no such thread, the guard waits for the end of the socket. Call this
     function while few files are open and no other thread runs.
