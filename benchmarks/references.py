@@ -83,6 +83,7 @@ def references() -> list[Row]:
     names = asked("env", TARGETS)
     most = int(os.environ.get("SEEDS", "10"))
     wanted = [(name, seed) for name in names for seed in range(_seeds(name, most))]
+    earlier = [name for name, seed in wanted if (RESULTS / f"{name}-{seed}.json").exists()]
     RESULTS.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         curves = list(pool.map(_trained, *zip(*wanted, strict=True)))
@@ -90,7 +91,7 @@ def references() -> list[Row]:
     rows: list[Row] = []
     for name in names:
         of_env = [curve for (one, _), curve in zip(wanted, curves, strict=True) if one == name]
-        rows.append(_write(name, of_env, found))
+        rows.append(_write(name, of_env, found, earlier.count(name)))
     ordered = {_env(name).id: found[_env(name).id] for name in TARGETS if _env(name).id in found}
     write_atomic(
         FOLDER / "references.json",
@@ -145,8 +146,16 @@ def _taken_from_atlas(name: str, seed: int, place: Path) -> bool:
     return False
 
 
-def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, EnvReference]) -> Row:
-    """Copy the best policy of an env into the package, with its values."""
+def _write(
+    name: str,
+    curves: list[tuple[Evaluation, ...]],
+    found: dict[str, EnvReference],
+    earlier: int,
+) -> Row:
+    """Copy the best policy of an env into the package, with its values.
+
+    The row states how many trainings were finished by earlier runs, with other `SEEDS` perhaps.
+    """
     env, target = _env(name), TARGETS[name]
     floor, measures = _floor(env)
     ends = {
@@ -177,8 +186,8 @@ def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, Env
         f"reference of {name}: {target.measure} of the policy that ships, "
         f"{reference.learner}, {reference.steps:,} steps",
         f"{last:.4g}",
-        f"{EPISODES} episodes; {len(values)} seed{'s' * (len(values) > 1)} end at "
-        + ", ".join(f"{value:.4g}" for value in values),
+        f"{EPISODES} episodes; {len(values)} seed{'s' * (len(values) > 1)}, of which {earlier} "
+        "trained in earlier runs, end at " + ", ".join(f"{value:.4g}" for value in values),
         "none: whatever comes out" if target.wanted is None else f"at least {target.wanted:g}",
         target.wanted is None or last >= target.wanted,
     )
