@@ -49,7 +49,7 @@ def demo() -> list[Row]:
         Row(
             "make demo without its installation, 5 seeds an arm, wall clock",
             f"{took_s:.0f} s",
-            f"one round, {spent_s:.0f} s of CPU time on {os.cpu_count()} cores, load {load:.1f} before",
+            f"{spent_s:.0f} s of CPU time, {os.cpu_count()} cores, load {load:.1f} before",
             "< 60 s on a quiet machine",
             took_s < 60.0,
         ),

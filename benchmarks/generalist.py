@@ -9,6 +9,7 @@ of trainings, and `WORKERS` how many run at a time. The scores of each body are 
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from concurrent.futures import ProcessPoolExecutor
@@ -34,6 +35,10 @@ from shapechanger.transfer.limbs.envs import LimbLearner, fitted
 
 OUT: Final = Path("results", "generalist")
 RUNS: Final = Path("benchmarks", "results", "generalist-runs.json")
+GPU_POLICY: Final = RUNS.with_name("generalist-gpu.safetensors")
+SPECIALISTS: Final = RUNS.with_name("atlas-ants-runs.json")
+# Episodes in each ant that has specialists.
+EPISODES: Final = 3
 COMMAND: Final = "python -m benchmarks.run generalist"
 SEEDS: Final = 5
 BODIES: Final = 32
@@ -180,9 +185,8 @@ def _scores(network: str, seed: int, file: Path) -> Scores:
 
 def of_gpu() -> list[Row]:
     """Evaluate the policy that `gpu-generalist` trained in many ants."""
-    file = Path("benchmarks", "results", "generalist-gpu.safetensors")
-    card = load_policy(file).card
-    scores = _scores("limbs", card.seed, file)
+    card = load_policy(GPU_POLICY).card
+    scores = _scores("limbs", card.seed, GPU_POLICY)
     learned = f"one policy, {card.steps:,} steps in {card.env.kwargs['bodies']['count']} ants"
     return [
         *(
@@ -205,6 +209,34 @@ def of_gpu() -> list[Row]:
     ]
 
 
+def against_specialists() -> list[Row]:
+    """Compare the policy that `gpu-generalist` trained with policies trained in one ant each.
+
+    The specialists are the sources of the suite of ants, and their speed is that of the atlas: the
+    mean of the last three evaluations.
+    """
+    use_one_thread()
+    atlas = json.loads(SPECIALISTS.read_text())
+    rows: list[Row] = []
+    for name in ("Ant", "AmputatedAnt", "BigAnt", "ExtendedAnt"):
+        sources = next(
+            runs["source"] for pair, runs in atlas.items() if pair.startswith(f"{name}-")
+        )
+        alone = float(np.mean([run["values"][-3:] for run in sources]))
+        ours = _speed_in(GPU_POLICY, EnvRef(f"shapechanger/{name}-v1"), EPISODES)
+        rows.append(
+            Row(
+                f"{name}: forward speed of a policy learned on a GPU over that of specialists",
+                f"{ours / alone:.0%}",
+                f"{ours:.2f} m/s zero-shot, {EPISODES} episodes; {len(sources)} specialists "
+                f"{alone:.2f} m/s after {sources[0]['steps'][-1]:,} steps in {name}",
+                "none: whatever comes out",
+                True,
+            )
+        )
+    return rows
+
+
 def _settings(network: str) -> LimbSettings:
     """Return the shipped settings of a network."""
     return cast("LimbSettings", learner_settings(network))
@@ -214,13 +246,15 @@ def _bodies(split: str, draw: int = 0) -> list[EnvRef]:
     return each_body(ANT.having({"bodies": {"split": split, "count": BODIES, "seed": draw}}))
 
 
-def _speed_in(file: Path, body: EnvRef) -> float:
-    """Return the forward speed of a policy in a body over an episode, m/s."""
+def _speed_in(file: Path, body: EnvRef, episodes: int = 1) -> float:
+    """Return the forward speed of a policy in a body over some episodes, m/s."""
     policy = load_policy(file)
     room = getattr(policy.card.settings, "room", 0)
     env = fitted(body.make(), policy.card.observation, room)
     try:
-        return evaluate(policy.act, [env], EVALUATION_SEED).value("forward speed")
+        return evaluate(policy.act, [env], EVALUATION_SEED, episodes=episodes).value(
+            "forward speed"
+        )
     finally:
         env.close()
 

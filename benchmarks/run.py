@@ -74,6 +74,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "references": _suite("references", "references"),
     "generalist": _suite("generalist", "generalist"),
     "generalist-gpu": _suite("generalist", "of_gpu"),
+    "generalist-specialists": _suite("generalist", "against_specialists"),
     "speed": _suite("speed", "single"),
     "speed-vector": _suite("speed_vector", "vector"),
     "robot-link": _suite("robots", "link"),
