@@ -212,8 +212,8 @@ def of_gpu() -> list[Row]:
 def against_specialists() -> list[Row]:
     """Compare the policy that `gpu-generalist` trained with policies trained in one ant each.
 
-    The specialists are the sources of the suite of ants, and their speed is that of the atlas: the
-    mean of the last three evaluations.
+    The specialists are the sources of the suite of ants. Their speed is the mean of the last three
+    evaluations, as in the atlas.
     """
     use_one_thread()
     atlas = json.loads(SPECIALISTS.read_text())
