@@ -1,20 +1,38 @@
 """Comparisons that the documentation states, computed from the published runs."""
 
 import json
-from pathlib import Path
+import re
 
 import numpy as np
 import pytest
 from scipy import stats
 
-ROOT = Path(__file__).parents[2]
+from shapechanger.transfer.metrics.intervals import probability_of_improvement
+from tests.claims.test_published_numbers import ROOT, page, rows
+
 RESULTS = ROOT / "benchmarks" / "results"
-ATLAS = (ROOT / "docs" / "atlas.md").read_text(encoding="utf-8")
-MANY_BODIES = (ROOT / "docs" / "many-bodies.md").read_text(encoding="utf-8")
+
+
+SPLITS = ("interpolation", "extrapolation", "composition")
 
 
 def load(name):
     return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def words(name):
+    """Return the text of a page with single spaces."""
+    return " ".join(page(name).split())
+
+
+def found(pattern, file, name=""):
+    """Return the groups of a pattern in the rows of a file whose names contain a text."""
+    return [
+        [float(one.replace(",", "")) for one in match.groups()]
+        for row, text in rows(file)
+        if name in row
+        for match in re.finditer(pattern, text)
+    ]
 
 
 def difference(ours, theirs):
@@ -41,8 +59,7 @@ def test_the_atlas_names_each_pair_whose_interval_excludes_zero(pairs, arm):
             found[pair] = f"[{low:+.2f}, {high:+.2f}]"
     expected = ["Ant-to-BigAnt", "AmputatedAnt-to-ExtendedAnt"]
     assert list(found) == expected[: 1 if arm == "frozen-trunk" else 2]
-    text = " ".join(ATLAS.split())
-    assert all(interval in text for interval in found.values())
+    assert all(interval in words("atlas") for interval in found.values())
 
 
 def test_scratch_with_the_steps_of_the_source_is_ahead_in_seven_pairs(pairs):
@@ -53,42 +70,46 @@ def test_scratch_with_the_steps_of_the_source_is_ahead_in_seven_pairs(pairs):
     ]
     assert sum(low > 0.0 for _, low, _ in intervals) == 7
     assert sum(high < 0.0 for _, _, high in intervals) == 1
-    assert "ahead of\nfine-tuning in 7 of the 12 pairs of ants, and behind in 1" in ATLAS
+    assert "ahead of fine-tuning in 7 of the 12 pairs of ants, and behind in 1" in words("atlas")
 
 
 def test_differences_between_limbs_and_padding_equal_the_runs():
     runs = load("generalist-runs")
-    text = " ".join(MANY_BODIES.split())
     for split in runs[0]["splits"]:
         ours, theirs = (
             [np.mean(run["splits"][split]) for run in runs if run["network"] == network]
             for network in ("limbs", "padded")
         )
         mean, low, high = difference(ours, theirs)
-        assert f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]" in text, split
+        assert f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]" in words("many-bodies"), split
 
 
 def test_the_atlas_compares_methods_as_the_runs_do(pairs):
     def above(arm, among):
         """Return the probability that a run ends above a fine-tuned one on the same pair."""
-        wins = [
-            np.mean(
-                np.greater.outer(at_the_end(pairs[pair][arm]), at_the_end(pairs[pair]["fine-tune"]))
-            )
-            for pair in among
-        ]
-        return f"{np.mean(wins):.2f}"
+        ends, tuned = (
+            [np.array(at_the_end(pairs[pair][one])) for pair in among] for one in (arm, "fine-tune")
+        )
+        chance = probability_of_improvement(ends, tuned, rng=np.random.default_rng(0))
+        return f"{chance.value:.2f} [{chance.low:.2f}, {chance.high:.2f}]"
+
+    def places(among):
+        """Return the place of evolution's mean among the three ways to fine-tune in each pair."""
+        arms = ("fine-tune", "frozen-trunk", "evolution")
+        ends = [[np.mean(at_the_end(pairs[pair][arm])) for arm in arms] for pair in among]
+        return [sorted(one, reverse=True).index(one[2]) for one in ends]
 
     extended = [pair for pair in pairs if "ExtendedAnt" in pair]
     others = [pair for pair in pairs if "ExtendedAnt" not in pair]
-    text = " ".join(ATLAS.split())
+    text = words("atlas")
     row = [above(arm, pairs) for arm in ("scratch", "frozen-trunk", "evolution")]
-    assert (
-        "| **probability to end above fine-tune** | {} | | {} [0.40, 0.61] | {} [".format(*row)
-        in text
-    )
-    assert f"is {above('evolution', extended)} [0.15, 0.39]" in text
-    assert f"probability of {above('evolution', others)} [0.44, 0.74]" in text
+    row[0] = row[0].split()[0]
+    assert "| **probability to end above fine-tune** | {} | | {} | {} |".format(*row) in text
+    assert f"is {above('evolution', extended)}" in text
+    assert f"probability of {above('evolution', others)}" in text
+    assert (places(extended).count(2), places(others).count(0)) == (5, 4)
+    assert "the worst mean in five" in text
+    assert "the best mean in four" in text
 
 
 def test_from_a_body_that_walks_every_fine_tuned_run_ends_ahead(pairs):
@@ -107,44 +128,74 @@ def test_the_atlas_states_the_speeds_of_sources_and_of_zero_shot_big_ants(pairs)
         runs = next(runs for pair, runs in pairs.items() if pair.startswith(f"{source}-to"))
         return " to ".join(f"{one(at_the_end(runs['source'])):.1f}" for one in (min, max))
 
-    text = " ".join(ATLAS.split())
+    text = words("atlas")
+    both = (at_the_end(pairs["ExtendedAnt-to-Ant"][arm]) for arm in ("fine-tune", "scratch"))
+    assert "a difference of {:.2f} [{:+.2f}, {:+.2f}]".format(*difference(*both)) in text
     assert f"walk at {ends('ExtendedAnt')} m/s" in text
     assert f"{ends('AmputatedAnt')} m/s and at {ends('BigAnt')}, the ant's at {ends('Ant')}" in text
     speeds = [np.mean(run["values"]) for run in pairs["Ant-to-BigAnt"]["zero-shot"]]
     assert f"{min(speeds):.2f} to {max(speeds):.2f} over seeds" in text
+    assert f"an ant alone walks at {ends('Ant')} m/s" in words("many-bodies")
 
 
-def test_the_share_of_speed_that_policies_of_limbs_keep():
+def test_the_atlas_states_when_runs_with_a_replay_buffer_balance():
+    (runs,) = load("atlas-replay-runs").values()
+    scratch, tuned = (
+        [run["steps"][int(np.argmax(np.array(run["values"]) >= 950.0))] for run in runs[arm]]
+        for arm in ("scratch", "fine-tune")
+    )
+    assert f"only after {min(scratch):,} to {max(scratch):,} steps" in words("atlas")
+    assert set(tuned) == {4_000}
+    assert "balances after 4,000 steps with every seed" in words("atlas")
+
+
+def test_the_share_of_speed_that_policies_of_limbs_keep(pairs):
     runs = load("generalist-runs")
-    text = " ".join(MANY_BODIES.split())
-    kept = {}
+    text = words("many-bodies")
+    kept, speeds = {}, {}
     for network in ("limbs", "padded"):
         mine = [run for run in runs if run["network"] == network]
         speed = {key: np.mean([run["splits"][key] for run in mine]) for key in mine[0]["splits"]}
         speed["extended"] = np.mean([run["extended"] for run in mine])
         kept[network] = {key: f"{100 * one / speed['train']:.0f}" for key, one in speed.items()}
-    ours = [kept["limbs"][key] for key in ("interpolation", "extrapolation", "composition")]
+        speeds[network] = speed
+    ours = [kept["limbs"][key] for key in SPLITS]
     assert (
-        "keeps {} % of its speed in the training bodies in interpolation, {} % in extrapolation "
+        "in the training bodies it keeps {} % in interpolation, {} % in extrapolation "
         "and {} % in composition".format(*ours)
         in text
     )
-    theirs = [kept["padded"][key] for key in ("interpolation", "extrapolation", "composition")]
+    theirs = [kept["padded"][key] for key in SPLITS]
     assert "padded policies keep {}, {} and {} %".format(*theirs) in text
     rows = {row["name"]: float(row["value"].split()[0]) for row in load("generalist-gpu")["rows"]}
     gpu = {name.split(": ")[0].removeprefix("32 ants, "): one for name, one in rows.items()}
-    share = [
-        f"{100 * gpu[key] / gpu['train']:.0f}"
-        for key in ("interpolation", "extrapolation", "composition", "ExtendedAnt, zero-shot")
-    ]
+    share = [f"{100 * gpu[key] / gpu['train']:.0f}" for key in (*SPLITS, "ExtendedAnt, zero-shot")]
     before = [*ours, kept["limbs"]["extended"]]
     both = [one for two in zip(share, before, strict=True) for one in two]
     expected = (
-        "keeps {} % of its speed in the training bodies in interpolation ({} % with 32 ants), "
+        "in the training bodies it keeps {} % in interpolation ({} % with 32 ants), "
         "{} % in extrapolation ({} %), "
         "{} % in compositions ({} %), and {} % with 12 joints ({} %)"
     )
     assert expected.format(*both) in text
+    ant, extended = (
+        np.mean(at_the_end(pairs[pair]["source"]))
+        for pair in ("Ant-to-BigAnt", "ExtendedAnt-to-Ant")
+    )
+    reached = [f"{100 * speeds['limbs'][key] / ant:.0f}" for key in ("train", *SPLITS)]
+    assert (
+        "plain ant, {:.2f} m/s in the mean, policies of limbs reach {} % in the training bodies, "
+        "{} % in interpolation, {} % in extrapolation and {} % in composition. In the "
+        "`ExtendedAnt`, they reach {:.0f} % of its own specialists' {:.2f} m/s".format(
+            ant, *reached, 100 * speeds["limbs"]["extended"] / extended, extended
+        )
+        in text
+    )
+    padded = sorted(np.mean(run["splits"]["train"]) for run in runs if run["network"] == "padded")
+    one = max(run["extended"] for run in runs if run["network"] == "limbs")
+    assert f"walks well, at {one:.2f} m/s" in text
+    assert f"{padded[-1]:.2f} m/s in its training bodies, the others {padded[0]:.2f} to " in text
+    assert f"the others {padded[0]:.2f} to {padded[-2]:.2f}, so" in text
 
 
 def test_the_atlas_pools_scores_as_the_runs_do(pairs):
@@ -167,4 +218,67 @@ def test_the_atlas_pools_scores_as_the_runs_do(pairs):
         for arm in ("scratch", "fine-tune", "frozen-trunk", "evolution")
     ]
     row = " | ".join(f"{mean:.2g}" for mean in means)
-    assert f"| **interquartile mean of the score** | {row} |" in ATLAS
+    assert f"| **interquartile mean of the score** | {row} |" in page("atlas")
+
+
+def test_ranges_and_counts_follow_from_the_rows():
+    """Shares, ranges and counts that are in no row themselves."""
+    sizes = [
+        100 * one / two for one, two in found(r"([\d.]+) MB in place of ([\d.]+)", "exchange-video")
+    ]
+    assert f"has {min(sizes):.0f} to {max(sizes):.0f} % of the bytes" in words("exchange")
+
+    def off(name):
+        return [100 * one for (one,) in found(r"logarithm ([\d.]+)", "finger-identify", name)]
+
+    *some, last = off("joint_stiffness")
+    damping, (friction,) = off("joint_damping"), off("tendon_friction")
+    text = words("identify")
+    assert f"off by {min(some):.0f} to {max(some):.0f} %, the end joint by {last:.0f} %" in text
+    assert f"single fingers off by {min(damping):.0f} to {max(damping):.0f} %" in text
+    assert f"0.93; single fingers off by {friction:.0f} %" in text
+
+    (steps,), (seconds,) = (
+        found(one, "gpu-generalist") for one in (r"ants .*: steps ([\d,]+)", r"([\d,]+) s ")
+    )
+    assert f"learned from {steps[0] / seconds[0]:,.0f}"[:-3] + "000 steps per second" in words(
+        "gpu"
+    )
+
+    reach = next(text for name, text in rows("finger-gap") if "comes to from rest, against" in name)
+    shares = [int(one) for one in re.findall(r"(\d+)%", reach.partition("fingers: ")[2])]
+    assert "two fingers, seeds {} and {}:".format(*sorted(np.argsort(shares)[:2])) in words(
+        "finger"
+    )
+
+    (gain,) = found(r"score \+[\d.]+ \[([-+\d.]+),", "demo")
+    assert gain[0] > 0.0
+    assert "fine-tuning is ahead of training from scratch" in words("README.md")
+
+
+def test_comparisons_of_vehicles_follow_from_the_rows():
+    text = words("vehicles")
+    for seconds in (15, 30):
+        name = f"return of rehearsal over scratch after {seconds} s"
+        means = found(
+            r"s ([-\d.]+) to ([-\d.]+) .*zero-shot ([-\d.]+)", "vehicles-waypoint-studies", name
+        )
+        assert [ours > scratch for ours, scratch, _ in means] == 12 * [True]
+    assert "Rehearsal is ahead in the mean on all twelve pairs" in text
+    raised = [
+        100 * (ours / zero - 1)
+        for target in ("Car", "Tank", "Truck")
+        for ours, zero in found(
+            r"after 15 s ([-\d.]+) to .*zero-shot ([-\d.]+)",
+            "vehicles-waypoint-studies",
+            f"BoatWaypoint-to-{target}Waypoint: return of rehearsal",
+        )
+    ]
+    assert len(raised) == 3
+    assert f"raise its return by {min(raised):.0f} to {max(raised):.0f} %" in text
+    gains = found(r"total reward gain ([-+\d.]+) \[([-+\d.]+), ([-+\d.]+)\]", "vehicles-pairs")
+    assert [low < 0.0 < high for _, low, high in gains] == 12 * [True]
+    least, most = (one(gain for gain, _, _ in gains) for one in (min, max))
+    assert f"gains lie between {least:+.1f} and {most:+.2f} scores, and none of" in text
+    early = found(r"with after ([\d.]+) min, scratch after ([\d.]+) min", "vehicles-pairs")
+    assert sum(ours <= 0.5 * scratch for ours, scratch in early) == 1

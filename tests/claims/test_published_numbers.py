@@ -106,6 +106,7 @@ SENTENCES: Final = [
     ("finger", "can end at 94 %", "finger-gap", "comes to from rest, against"),
     ("finger", "policy reaches 20 % on a twin", "finger-rig", "nominal finger"),
     ("finger", "takes 13 minutes a finger", "finger-command", "minutes a finger"),
+    ("finger", "53 minutes of runs for the two fingers", "finger-command", "minutes a finger"),
     ("finger", "within 1.7 mm RMS (1.1 to 2.5)", "finger-follow", "identified policy"),
     ("finger", "is 10 mm off", "finger-follow", "shipped policy"),
     ("finger", "9.7 degrees off in the median and 15.7", "finger-physics", "end joint"),
