@@ -21,14 +21,9 @@ FIRST_SEED = 2_000_000
 _CIRCLE = {"kind": "circle", "radius": 0.012, "hz": 0.5}
 
 
-class _Policy:
-    """A policy that acts in a single env."""
-
-    def __init__(self, policy: TrainedPolicy) -> None:
-        self._policy = policy
-
-    def __call__(self, observation: Any) -> Any:
-        return self._policy.act(np.asarray(observation)[None])[0]
+def _alone(policy: TrainedPolicy) -> Any:
+    """Return a policy that acts in a single env."""
+    return lambda observation: policy.act(np.asarray(observation)[None])[0]
 
 
 def _ends(act: Any, env: str, episodes: int, **arguments: Any) -> list[dict[str, Any]]:
@@ -54,7 +49,7 @@ def test_the_shipped_policy_reaches() -> None:
     """The policy reaches nine of ten targets, and its card names the env."""
     policy = load_policy(POLICIES["reach"])
     assert policy.card.env.id == FINGER
-    infos = _ends(_Policy(policy), FINGER, 10)
+    infos = _ends(_alone(policy), FINGER, 10)
     assert np.mean([info["is_success"] for info in infos]) >= 0.9
 
 
@@ -62,7 +57,7 @@ def test_the_shipped_policy_follows() -> None:
     """The policy's RMS error on a circle at 0.5 Hz is at most twice the controller's."""
     policy = load_policy(POLICIES["track"])
     assert policy.card.env.id == TRACK
-    infos = _ends(_Policy(policy), TRACK, 1, path=_CIRCLE)
+    infos = _ends(_alone(policy), TRACK, 1, path=_CIRCLE)
     knows = _ends(_controller(TRACK, "impedance"), TRACK, 1, path=_CIRCLE)
     errors = [np.mean([info["rms"] for info in some]) for some in (infos, knows)]
     assert errors[0] <= 2.0 * errors[1]
@@ -70,7 +65,7 @@ def test_the_shipped_policy_follows() -> None:
 
 def test_the_gap_halves_the_success() -> None:
     """On real-like fingers, the shipped policy reaches fewer than half of the targets."""
-    act = _Policy(load_policy(POLICIES["reach"]))
+    act = _alone(load_policy(POLICIES["reach"]))
     infos: list[dict[str, Any]] = []
     for finger in range(3):
         infos += _ends(act, FINGER, 3, gap="real-like", finger_seed=finger)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,6 @@ from shapechanger.transfer.metrics.intervals import probability_of_improvement
 from tests.claims.test_published_numbers import ROOT, page, rows
 
 RESULTS = ROOT / "benchmarks" / "results"
-
-
 SPLITS = ("interpolation", "extrapolation", "composition")
 
 
@@ -25,14 +24,18 @@ def words(name):
     return " ".join(page(name).split())
 
 
-def found(pattern, file, name=""):
-    """Return the groups of a pattern in the rows of a file whose names contain a text."""
-    return [
-        [float(one.replace(",", "")) for one in match.groups()]
-        for row, text in rows(file)
-        if name in row
-        for match in re.finditer(pattern, text)
-    ]
+def in_rows(pattern, file, name="") -> Any:
+    """Return the number of each match in the rows with a name, or its numbers if several."""
+    text = "\n".join(text for row, text in rows(file) if name in row)
+    text = re.sub(r"(?<=\d),(?=\d{3})", "", text)
+    found = np.array(re.findall(pattern, text), float)
+    assert found.size, pattern
+    return found.tolist()
+
+
+def span(values, factor=1, digits=0):
+    """Return the range of some numbers as the pages write it."""
+    return " to ".join(f"{factor * one(values):.{digits}f}" for one in (min, max))
 
 
 def difference(ours, theirs):
@@ -93,11 +96,11 @@ def test_the_atlas_compares_methods_as_the_runs_do(pairs):
         chance = probability_of_improvement(ends, tuned, rng=np.random.default_rng(0))
         return f"{chance.value:.2f} [{chance.low:.2f}, {chance.high:.2f}]"
 
-    def places(among):
-        """Return the place of evolution's mean among the three ways to fine-tune in each pair."""
+    def with_evolution(among, best):
+        """Return in how many pairs evolution has the best of the three means, or the worst."""
         arms = ("fine-tune", "frozen-trunk", "evolution")
         ends = [[np.mean(at_the_end(pairs[pair][arm])) for arm in arms] for pair in among]
-        return [sorted(one, reverse=True).index(one[2]) for one in ends]
+        return sum(one[2] == best(one) for one in ends)
 
     extended = [pair for pair in pairs if "ExtendedAnt" in pair]
     others = [pair for pair in pairs if "ExtendedAnt" not in pair]
@@ -107,9 +110,8 @@ def test_the_atlas_compares_methods_as_the_runs_do(pairs):
     assert "| **probability to end above fine-tune** | {} | | {} | {} |".format(*row) in text
     assert f"is {above('evolution', extended)}" in text
     assert f"probability of {above('evolution', others)}" in text
-    assert (places(extended).count(2), places(others).count(0)) == (5, 4)
-    assert "the worst mean in five" in text
-    assert "the best mean in four" in text
+    assert (with_evolution(extended, min), with_evolution(others, max)) == (5, 4)
+    assert re.search("worst mean in five.*best mean in four", text)
 
 
 def test_from_a_body_that_walks_every_fine_tuned_run_ends_ahead(pairs):
@@ -126,7 +128,7 @@ def test_from_a_body_that_walks_every_fine_tuned_run_ends_ahead(pairs):
 def test_the_atlas_states_the_speeds_of_sources_and_of_zero_shot_big_ants(pairs):
     def ends(source):
         runs = next(runs for pair, runs in pairs.items() if pair.startswith(f"{source}-to"))
-        return " to ".join(f"{one(at_the_end(runs['source'])):.1f}" for one in (min, max))
+        return span(at_the_end(runs["source"]), digits=1)
 
     text = words("atlas")
     both = (at_the_end(pairs["ExtendedAnt-to-Ant"][arm]) for arm in ("fine-tune", "scratch"))
@@ -134,7 +136,7 @@ def test_the_atlas_states_the_speeds_of_sources_and_of_zero_shot_big_ants(pairs)
     assert f"walk at {ends('ExtendedAnt')} m/s" in text
     assert f"{ends('AmputatedAnt')} m/s and at {ends('BigAnt')}, the ant's at {ends('Ant')}" in text
     speeds = [np.mean(run["values"]) for run in pairs["Ant-to-BigAnt"]["zero-shot"]]
-    assert f"{min(speeds):.2f} to {max(speeds):.2f} over seeds" in text
+    assert f"{span(speeds, digits=2)} over seeds" in text
     assert f"an ant alone walks at {ends('Ant')} m/s" in words("many-bodies")
 
 
@@ -194,8 +196,8 @@ def test_the_share_of_speed_that_policies_of_limbs_keep(pairs):
     padded = sorted(np.mean(run["splits"]["train"]) for run in runs if run["network"] == "padded")
     one = max(run["extended"] for run in runs if run["network"] == "limbs")
     assert f"walks well, at {one:.2f} m/s" in text
-    assert f"{padded[-1]:.2f} m/s in its training bodies, the others {padded[0]:.2f} to " in text
-    assert f"the others {padded[0]:.2f} to {padded[-2]:.2f}, so" in text
+    others = span(padded[:-1], digits=2)
+    assert f"{padded[-1]:.2f} m/s in its training bodies, the others {others}, so" in text
 
 
 def test_the_atlas_pools_scores_as_the_runs_do(pairs):
@@ -223,62 +225,39 @@ def test_the_atlas_pools_scores_as_the_runs_do(pairs):
 
 def test_ranges_and_counts_follow_from_the_rows():
     """Shares, ranges and counts that are in no row themselves."""
-    sizes = [
-        100 * one / two for one, two in found(r"([\d.]+) MB in place of ([\d.]+)", "exchange-video")
-    ]
-    assert f"has {min(sizes):.0f} to {max(sizes):.0f} % of the bytes" in words("exchange")
+    sizes = [one / two for one, two in in_rows(r"([\d.]+) MB in \w+ of ([\d.]+)", "exchange-video")]
+    assert f"has {span(sizes, 100)} % of the bytes" in words("exchange")
 
-    def off(name):
-        return [100 * one for (one,) in found(r"logarithm ([\d.]+)", "finger-identify", name)]
-
-    *some, last = off("joint_stiffness")
-    damping, (friction,) = off("joint_damping"), off("tendon_friction")
+    *stiffness, last, a, b, c, d, friction, _, _ = in_rows(r"rithm ([\d.]+)", "finger-identify")
     text = words("identify")
-    assert f"off by {min(some):.0f} to {max(some):.0f} %, the end joint by {last:.0f} %" in text
-    assert f"single fingers off by {min(damping):.0f} to {max(damping):.0f} %" in text
-    assert f"0.93; single fingers off by {friction:.0f} %" in text
+    assert f"off by {span(stiffness, 100)} %, the end joint by {100 * last:.0f} %" in text
+    assert f"0.99 to 1.02 in the mean; single fingers off by {span([a, b, c, d], 100)} %" in text
+    assert f"0.93; single fingers off by {100 * friction:.0f} %" in text
 
-    (steps,), (seconds,) = (
-        found(one, "gpu-generalist") for one in (r"ants .*: steps ([\d,]+)", r"([\d,]+) s ")
-    )
-    assert f"learned from {steps[0] / seconds[0]:,.0f}"[:-3] + "000 steps per second" in words(
-        "gpu"
-    )
+    (steps,) = in_rows(r"ants .*: steps ([\d,]+)", "gpu-generalist")
+    (seconds,) = in_rows(r"([\d,]+) s with", "gpu-generalist")
+    assert f"learned from {steps / seconds // 1000:.0f},000 steps per second" in words("gpu")
 
     reach = next(text for name, text in rows("finger-gap") if "comes to from rest, against" in name)
     shares = [int(one) for one in re.findall(r"(\d+)%", reach.partition("fingers: ")[2])]
-    assert "two fingers, seeds {} and {}:".format(*sorted(np.argsort(shares)[:2])) in words(
-        "finger"
-    )
+    weak = "two fingers, seeds {} and {}:".format(*sorted(np.argsort(shares)[:2]))
+    assert weak in words("finger")
 
-    (gain,) = found(r"score \+[\d.]+ \[([-+\d.]+),", "demo")
-    assert gain[0] > 0.0
+    (low,) = in_rows(r"score \+[\d.]+ \[([-+\d.]+),", "demo")
+    assert low > 0.0
     assert "fine-tuning is ahead of training from scratch" in words("README.md")
 
 
 def test_comparisons_of_vehicles_follow_from_the_rows():
     text = words("vehicles")
-    for seconds in (15, 30):
-        name = f"return of rehearsal over scratch after {seconds} s"
-        means = found(
-            r"s ([-\d.]+) to ([-\d.]+) .*zero-shot ([-\d.]+)", "vehicles-waypoint-studies", name
-        )
-        assert [ours > scratch for ours, scratch, _ in means] == 12 * [True]
+    studies = "vehicles-waypoint-studies"
+    returns = in_rows(r"rehearsal over scratch after \d+ s ([-\d.]+) to ([-\d.]+)", studies)
+    assert [ours > scratch for ours, scratch in returns] == 24 * [True]
     assert "Rehearsal is ahead in the mean on all twelve pairs" in text
-    raised = [
-        100 * (ours / zero - 1)
-        for target in ("Car", "Tank", "Truck")
-        for ours, zero in found(
-            r"after 15 s ([-\d.]+) to .*zero-shot ([-\d.]+)",
-            "vehicles-waypoint-studies",
-            f"BoatWaypoint-to-{target}Waypoint: return of rehearsal",
-        )
-    ]
-    assert len(raised) == 3
-    assert f"raise its return by {min(raised):.0f} to {max(raised):.0f} %" in text
-    gains = found(r"total reward gain ([-+\d.]+) \[([-+\d.]+), ([-+\d.]+)\]", "vehicles-pairs")
+    pattern = r"rehearsal over scratch after 15 s ([-\d.]+) to .*zero-shot ([-\d.]+)"
+    raised = [ours / zero - 1 for ours, zero in in_rows(pattern, studies, "BoatWaypoint-to")]
+    assert f"raise its return by {span(raised, 100)} %" in text
+    gains = in_rows(r"reward gain ([-+\d.]+) \[([-+\d.]+), ([-+\d.]+)\]", "vehicles-pairs")
     assert [low < 0.0 < high for _, low, high in gains] == 12 * [True]
     least, most = (one(gain for gain, _, _ in gains) for one in (min, max))
     assert f"gains lie between {least:+.1f} and {most:+.2f} scores, and none of" in text
-    early = found(r"with after ([\d.]+) min, scratch after ([\d.]+) min", "vehicles-pairs")
-    assert sum(ours <= 0.5 * scratch for ours, scratch in early) == 1

@@ -80,21 +80,6 @@ def _edited(name: str) -> mujoco.MjModel:
     return compile_body(family.load(Path(ASSETS) / source), family.bodies[name])
 
 
-@pytest.mark.parametrize("name", _RELEASED)
+@pytest.mark.parametrize("name", [*ANT.bodies, *PENDULUM.bodies])
 def test_edits_make_the_bodies_of_the_release(name: str) -> None:
     assert differing(mujoco.MjModel.from_xml_string(_RELEASED[name]), _edited(name)) == []
-
-
-def test_every_named_body_is_compared() -> None:
-    assert {*ANT.bodies, *PENDULUM.bodies} == {*_RELEASED}
-
-
-@pytest.mark.parametrize(
-    ("name", "kilograms"),
-    [
-        *(("Ant", 0.911), ("AmputatedAnt", 0.868), ("BigAnt", 1.138), ("ExtendedAnt", 1.295)),
-        ("ExtendedAntPassive", 1.295),
-    ],
-)
-def test_masses_of_the_ants(name: str, kilograms: float) -> None:
-    assert _edited(name).body_mass.sum() == pytest.approx(kilograms, abs=5e-4)

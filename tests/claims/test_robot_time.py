@@ -13,16 +13,8 @@ MAY: Final = {
     for part in ("check/report.py", "daemon/credentials.py", "daemon/recorder.py")
 }
 WALL: Final = {
-    "time.time",
-    "time.time_ns",
-    "time.localtime",
-    "time.gmtime",
-    "time.ctime",
-    "time.strftime",
-    "datetime.now",
-    "datetime.utcnow",
-    "datetime.today",
-    "date.today",
+    *(f"time.{name}" for name in ("time", "time_ns", "localtime", "gmtime", "ctime", "strftime")),
+    *("datetime.now", "datetime.utcnow", "datetime.today", "date.today"),
 }
 FILES: Final = [
     path

@@ -12,8 +12,6 @@ import pytest
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.operator import Whereabouts
 from shapechanger.robot.twin.robot import run_robot
-from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
-from shapechanger.vehicles.envs import VehicleEnv
 from shapechanger.vehicles.world import MujocoWorld
 from tests.robot.twin.in_process import InProcessRobot
 from tests.robots import write_profile
@@ -107,38 +105,3 @@ def _drive_served(actions: Sequence[Sequence[float]], image: bool) -> list[Where
             seen = client.observation(seen.seq).message
             found.append(operator.where())
     return found
-
-
-def _until_it_bumps(env: VehicleEnv) -> tuple[float, bool]:
-    """Return the reward and termination of the step that hits the wall at the next bend."""
-    env.reset(options={"course": _COURSE, "start": _START})
-    for _ in range(400):
-        _, _, terminated, truncated, info = env.step(np.array([-0.3, 0.6], np.float32))
-        assert not truncated
-        if info["collisions"]:
-            return info["reward_collision"], terminated
-    raise AssertionError("The car hit nothing.")
-
-
-def test_a_bumped_wall_costs_ten_and_ends_the_episode() -> None:
-    """An episode with `put_back` continues after a collision."""
-    with closing(VehicleEnv("car", image=False)) as env:
-        assert _until_it_bumps(env) == (-10.0, True)
-    with closing(VehicleEnv("car", image=False, put_back=True)) as env:
-        assert _until_it_bumps(env) == (-10.0, False)
-        before = env.world.progress_m
-        for _ in range(30):  # The bump reflex prevents driving forward for a while.
-            _, _, terminated, _, info = env.step(np.array([0.0, 0.4], np.float32))
-            assert not terminated
-        assert info["collisions"] == 1
-        assert info["progress"] > before + 0.1
-
-
-def test_training_and_held_out_courses_are_disjoint() -> None:
-    assert not set(TRAINING) & set(HELD_OUT)
-    with closing(VehicleEnv("car", image=False, courses=(1, 2, 3))) as env:
-        assert env.reset(seed=0)[1]["course"] in (1, 2, 3)
-        env.hold_out()
-        drawn = {env.reset(seed=seed)[1]["course"] for seed in range(8)}
-        assert drawn <= set(HELD_OUT)
-        assert len(drawn) == 8
