@@ -61,13 +61,13 @@ class Reshapable(MujocoEnv):
     pose are derived from the body.
 
     An env without a `render_mode` stores the textures of bodies and skies at half their width and
-    height, which saves a third of its memory.
+    height, to save memory.
 
     Three arguments are available in every env:
 
     - `shadows`: whether frames have shadows, reflections and smoothed edges. By default, frames of
-      more than 256 x 256 pixels have them, and smaller ones, which render twenty times faster
-      without them, do not.
+      more than 256 x 256 pixels have them, and smaller ones, which render faster without them,
+      do not.
     - `fast_model`: whether a cheaper model with bit-equal motion may step the physics, while
       MuJoCo's profiling clock (`data.timer`) is paused. Ants and single pendulums may have such a
       model; other envs accept the argument and ignore it.

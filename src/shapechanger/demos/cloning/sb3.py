@@ -1,7 +1,7 @@
 """Cloned policies as starting points for reinforcement learning with Stable-Baselines3.
 
-The encoders of the clone are frozen, and the learner works on their features: this is many times
-faster than on images, and untrained critics cannot destroy the encoders.
+The encoders of the clone are frozen, and the learner works on their features, so untrained critics
+cannot destroy the encoders.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def batched(envs: VectorEnv[Any, Any, Any], parts: Iterable[InfoColumns]) -> dic
 
     For each key there is an array of one entry per env, and under `_key` a mask of the envs with an
     entry. Gymnasium's method adds one env after another. Here it adds only the first env of each
-    part, which makes the arrays; the others are added together, in a tenth of the time.
+    part, which makes the arrays; the others are added together.
     """
     batch: dict[str, Any] = {}
     add: Any = cast("Any", envs)._add_info

@@ -200,8 +200,8 @@ def run_normally(pid: int) -> None:
 def run_promptly(priority: int) -> None:
     """Switch to real-time scheduling if permitted; exempt present objects from garbage collection.
 
-    On a machine with fourteen busy processes, stops were up to 50 ms late when the guard merely had
-    a better nice value. Child processes are not real-time.
+    With a better nice value alone, stops are late on a busy machine. Child processes are not
+    real-time.
     """
     run_early()
     # Only Linux has real-time scheduling, and not for every user; the robot also runs without it.
