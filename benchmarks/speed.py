@@ -128,7 +128,7 @@ def _ratio_row(name: str, ratios: list[float], target: float | None) -> Row:
 
 
 def _trick_rows() -> list[Row]:
-    """Return what each trick of an ant's step gains by itself."""
+    """Return the gain of each trick of an ant's step by itself."""
     clock = paused_clock()
     assert clock is not None, "A clock of a user is installed."
     with gym.make("shapechanger/Ant-v1") as env:
