@@ -202,8 +202,8 @@ class TunedStep(Reshapable):
         replaced: Methods and properties that `_advance` replaces; `tuned` is the class that it was
             written for.
         patience: Steps with a body, summed over all envs that have it, before a fast model is
-            searched. The search takes as long as many steps, so it would not pay off for a body that
-            soon changes. Results do not depend on the time of the search.
+            searched. The search takes as long as many steps, so it would not pay off for a body
+            that soon changes. Results do not depend on the time of the search.
     """
 
     replaced: ClassVar[tuple[str, ...]] = ()
