@@ -158,6 +158,7 @@ def parse(arguments: Sequence[str]) -> Any:
             for name, place in command.commands.items()
         ]
         kind, description = kind[tuple(described)], command.summary
+        rest = rest or ["--help"]  # tyro would only say that a command is missing.
     else:
         _require_options(rest, prog, command)
         kind, description = command, None
