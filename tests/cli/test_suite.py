@@ -51,7 +51,7 @@ class _Counting(Serial):
 def lanes() -> Iterator[None]:
     """Three lane envs instead of four vehicles, and fast clones."""
     with pytest.MonkeyPatch.context() as patch:
-        suite = SuiteFile(envs=(DRY.id, WET.id, ICY.id), learner="cloning")
+        suite = SuiteFile(name="Lanes", envs=(DRY.id, WET.id, ICY.id), learner="cloning")
         patch.setattr(suite_command, "load_suite", lambda name: suite)
         shipped = {**LEARNERS, "cloning": QUICK_CLONING}
         patch.setattr(presets, "LEARNERS", shipped)
@@ -98,6 +98,7 @@ def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> 
         assert (out / name / "report.html").stat().st_size > 10_000
         command = json.loads((out / name / "study.json").read_text())["command"]
         assert command == f"shapechanger suite run vehicles --seeds 2 --out {out}"
+    assert "<h1>Lanes</h1>" in (out / "index.html").read_text()
     assert "of 6 pairs fine-tune reached the final value of scratch in less than half of" in output
 
 

@@ -22,6 +22,9 @@ def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
     counts = {name: len(_pairs(name)) for name in shipped_suites()}
     few = {"lenses": 4, "methods": 1, "pendulums": 6, "replay": 1, "shank": 9}
     assert counts == few | {"ants": 12, "vehicles": 12, "waypoints": 12}
+    titles = {load_suite(name).name for name in shipped_suites()}
+    assert len(titles) == len(counts)
+    assert titles.isdisjoint(counts)
     for _, task in suite_tasks(load_suite("vehicles")):
         assert task.source.kwargs == task.target.kwargs == {"put_back": True}
     lenses = dict(suite_tasks(load_suite("lenses")))
@@ -42,6 +45,7 @@ def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
         ),
         ("\nseeds = 'many'\n", "line 2: Expected `int`, got `str`"),
         ("envs = [", "cannot be read"),
+        ("name = ''\n", "line 1: Expected `str` of length >= 1"),
         ("envs = ['Ant']\nsources = ['Ant']\ntargets = ['BigAnt']\n", "in one way"),
         ("envs = ['Ant',\n'Bigant', 'Hopper']\n", "mine.toml, line 2: No env"),
         ("pairs = [['Ant', {env = 'Ant', body = 'BigAnt'}], ['Ant', 'Ant']]", "called Ant-to-Ant"),

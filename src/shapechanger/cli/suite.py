@@ -240,8 +240,7 @@ class _Page:
         allow_own_modules(self.suite.learner, *self.suite.arms)
         with located_errors(name):
             self.tasks = dict(suite_tasks(self.suite))
-        self._name = Path(name).stem
-        self.out = out or Path("results", self._name)
+        self.out = out or Path("results", Path(name).stem)
         self._strips: dict[str, list[FilmStrip]] = {}
         self._studies = {
             one: read_json(self.out / one / STUDY_FILE, Study, f"delete {self.out / one}")
@@ -267,7 +266,7 @@ class _Page:
                 {one: values[one] for one in ordered},
             )
         page = suite_html(
-            self._name,
+            self.suite.name,
             ordered,
             seeds=self.suite.seeds,
             strips=self._strips,

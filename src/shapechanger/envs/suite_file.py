@@ -8,7 +8,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from itertools import permutations, product
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import msgspec
 
@@ -47,12 +47,14 @@ class SuiteFile(msgspec.Struct, forbid_unknown_fields=True):
     """Contents of a suite's file: `envs`, or `pairs`, or `sources` with `targets`, `sweep` or both.
 
     Attributes:
+        name: Title of the suite's page; the file's name without its suffix if not given.
         learner: Name of the learner; empty for the target's default.
         arms: Arms of each study; empty for scratch, zero-shot and fine-tune.
         steps: Target steps of a run; None for the learner's number.
         source_steps: Source steps of a source policy; None for the learner's number.
     """
 
+    name: Annotated[str, msgspec.Meta(min_length=1)] = ""
     envs: tuple[_Env, ...] = ()
     pairs: tuple[tuple[_Env, _Env], ...] = ()
     sources: tuple[_Env, ...] = ()
@@ -78,7 +80,7 @@ def load_suite(name: str) -> SuiteFile:
     path = _SHIPPED / f"{name}.toml" if name in shipped_suites() else Path(name)
     text, given = read_toml(path, "suite", shipped_suites())
     try:
-        return msgspec.convert(given, SuiteFile)
+        return msgspec.convert({"name": path.stem, **given}, SuiteFile)
     except msgspec.ValidationError as error:
         reason: Exception = error
         if unknown := re.search(r"unknown field `(\w+)`(?: - at `\$\.(\w+))?", str(error)):
