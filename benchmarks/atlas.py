@@ -28,8 +28,7 @@ from shapechanger.transfer.metrics.intervals import estimate_difference, probabi
 from shapechanger.transfer.metrics.measures import jumpstart, total_reward_gain
 from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.report.curves import sweep_chart
-from shapechanger.transfer.report.suite import gain_over_scratch
-from shapechanger.transfer.report.verdict import direction, estimate_text, finals
+from shapechanger.transfer.report.verdict import direction, estimate_text, finals, gain_over_scratch
 from shapechanger.transfer.runs import RunResult, learner_of
 from shapechanger.transfer.study import STUDY_FILE, Study
 
@@ -272,18 +271,17 @@ def _rows(studies: dict[str, Study]) -> list[Row]:
         rows.append(
             Row(
                 f"{name}: {plan.measure} of fine-tune over that of scratch, mean over the budget",
-                f"{estimate_text(gain_over_scratch(study), signed=True)}{unit}",
+                f"{estimate_text(gain_over_scratch(study, 'fine-tune'), signed=True)}{unit}",
                 f"{plan.seeds} seeds; at the end: {ends}{unit}",
                 "none: whatever comes out",
                 True,
             )
         )
-    ahead = sum(direction(gain_over_scratch(study)) == "up" for study in studies.values())
-    behind = sum(direction(gain_over_scratch(study)) == "down" for study in studies.values())
+    found = [direction(gain_over_scratch(study, "fine-tune")) for study in studies.values()]
     rows.append(
         Row(
             "studies in which fine-tune is ahead of scratch, and behind",
-            f"{ahead} and {behind} of {len(studies)}",
+            f"{found.count('up')} and {found.count('down')} of {len(studies)}",
             "95 % intervals over seeds",
             "none: whatever comes out",
             True,
@@ -323,7 +321,7 @@ def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
     for name, study in studies.items():
         source, _, target = name.partition("-to-")
         row, column = names.index(source), names.index(target)
-        gain = gain_over_scratch(study)
+        gain = gain_over_scratch(study, "fine-tune")
         gains[row, column] = gain.value
         ends = {arm: float(finals(study, arm).mean()) for arm in study.plan.arms}
         axes.text(

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from shapechanger.transfer.metrics.intervals import Estimate
 from shapechanger.transfer.report.verdict import (
@@ -13,10 +17,11 @@ from shapechanger.transfer.report.verdict import (
     arm_rows,
     caveats,
     direction,
-    is_flat,
+    learned,
     machine_text,
     measure_rows,
     other_arms,
+    outcome,
     verdict,
     weak_individuals,
 )
@@ -25,6 +30,10 @@ from tests.transfer.report.studies import STEPS, make_study, rising
 
 SCRATCH = rising(0.0, 1000.0, 3000.0)
 FLAT = rising(997.0, 1005.0, 3000.0, noise=2.0)
+MANY = ("scratch", "zero-shot", "fine-tune", "evolution", "randomised")
+# Straight lines, so that areas and crossings are easy to compute. Scratch rises from 0 to 1000 in
+# 10,240 steps, and its final value is the mean of the last three evaluations: 900.
+SLOPE = STEPS / STEPS[-1]
 
 
 @pytest.mark.parametrize(
@@ -45,7 +54,7 @@ def test_direction_follows_the_interval(estimate: Estimate, expected: Direction)
 @pytest.mark.parametrize(
     ("study", "words"),
     [
-        (make_study(), "Transfer helped: over 10,240 target steps fine-tune's return averages "),
+        (make_study(), "Transfer helped: over 10,240 target steps fine-tune's return averaged "),
         (make_study(fine_tune=rising(-400.0, 700.0, 4000.0, seed=5)), "Transfer hurt: over "),
         (
             make_study(fine_tune=SCRATCH + np.linspace(-200.0, 200.0, 5)[:, np.newaxis]),
@@ -53,14 +62,20 @@ def test_direction_follows_the_interval(estimate: Estimate, expected: Direction)
         ),
         (
             make_study(arms=("scratch", "zero-shot")),
-            "Transfer helped at the start: untrained on the target, zero-shot's return is 400 and ",
+            "Zero-shot stayed behind scratch: zero-shot's return was 400 without training, and "
+            "scratch's went from 1.23 to 881 in 10,240 ",
         ),
         (
-            make_study(scratch=FLAT, fine_tune=FLAT, zero_shot=FLAT[:, :1]),
-            "This budget or measure shows nothing: scratch's return starts at 997 and ends at 1,0",
+            make_study(scratch=FLAT, fine_tune=FLAT + 3000.0, zero_shot=FLAT[:, :1]),
+            "No arm learned in 10,240 target steps: scratch's return went from 997 to 1,000, and "
+            "fine-tune's went from 4,000 to 4,000.",
+        ),
+        (
+            make_study(scratch=FLAT, fine_tune=FLAT, evolution=SCRATCH * 3.0, arms=MANY[:4]),
+            "Neither scratch nor fine-tune learned in 10,240 target steps: scratch's return went ",
         ),
     ],
-    ids=["helped", "hurt", "unclear", "zero-shot", "flat"],
+    ids=["helped", "hurt", "unclear", "zero-shot", "flat", "a third arm"],
 )
 def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
     text = verdict(study)
@@ -70,33 +85,98 @@ def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
     assert len(text.split()) <= 25
 
 
-def test_the_other_arms_have_a_sentence() -> None:
-    """Arms that do not learn on the target are judged by their start."""
+def test_the_other_arms_have_sentences() -> None:
+    """Arms that are not trained on the target are compared with scratch at its end."""
     assert other_arms(make_study(arms=("scratch", "fine-tune"))) == ""
-    assert other_arms(make_study()) == "Of the other arms, zero-shot (400) helped."
-    same = other_arms(make_study(zero_shot=SCRATCH[:, :1]))
-    assert same.endswith(" made no clear difference.")
-
-
-def test_seeds_without_spread_are_not_called_unclear() -> None:
-    """If all seeds are equal, the verdict states that there is no interval."""
-    scratch = SCRATCH.copy()
-    scratch[:, 0] = 27.0
-    solved = np.full((len(scratch), 1), 1000.0)
-    study = make_study(scratch=scratch, zero_shot=solved)
-    words = "cannot be judged without an interval"
-    assert other_arms(study) == f"Of the other arms, zero-shot (1,000) {words}."
-    alone = make_study(scratch=scratch, zero_shot=solved, arms=("scratch", "zero-shot"))
-    assert verdict(alone) == (
-        f"Transfer {words} at the start: untrained on the target, zero-shot's return is 1,000 and "
-        "scratch's 27."
+    good = np.linspace(1500.0, 1600.0, 5)[:, np.newaxis]
+    assert other_arms(make_study(arms=MANY, randomised=good, evolution=SCRATCH)) == (
+        "Of the other arms, evolution (617) made no clear difference. Without training, randomised "
+        "(1,550) came out ahead of scratch; zero-shot (400) stayed behind scratch, which went from "
+        "1.23 to 881 in training."
     )
 
 
-def test_a_study_is_flat_only_if_no_arm_learns() -> None:
-    low = rising(0.0, 1.0, 3000.0, noise=0.1)
-    assert not is_flat(make_study(scratch=low))
-    assert is_flat(make_study(scratch=low + 100.0, fine_tune=low + 101.0, zero_shot=low[:, :1]))
+def test_seeds_without_spread_are_not_called_unclear() -> None:
+    """If there is no interval because all seeds are equal, the verdict says so."""
+    lines = np.tile(1000.0 * SLOPE, (5, 1))
+    solved = np.full((5, 1), 1000.0)
+    study = make_study(scratch=lines, zero_shot=solved)
+    words = "cannot be judged without an interval against scratch"
+    assert other_arms(study).startswith(f"Without training, zero-shot (1,000) {words}, which")
+    alone = make_study(scratch=lines, zero_shot=solved, arms=("scratch", "zero-shot"))
+    assert verdict(alone).startswith(f"Zero-shot {words}: zero-shot's return was 1,000 ")
+
+
+def test_two_seeds_have_means_and_a_way_on() -> None:
+    two = make_study(scratch=SCRATCH[:2], fine_tune=SCRATCH[:2] + 50.0)
+    assert verdict(two) == (
+        "Over 10,240 target steps fine-tune's return averaged 662 and scratch's 612. A verdict "
+        "needs at least 3 seeds: run the same study again with --seeds 5, and it keeps these runs "
+        "and adds the others."
+    )
+    assert other_arms(two).startswith("Without training, zero-shot (400) cannot be judged yet ")
+
+
+JUDGED = re.compile("helped|hurt|difference|differ|ahead|behind")
+values = st.floats(-2000.0, 2000.0)
+
+
+@st.composite
+def studies(draw: st.DrawFn, *, flat: bool = False) -> Study:
+    """Studies of two to six seeds whose arms start and end anywhere."""
+    arms = draw(st.sampled_from([MANY[:2], MANY[:3], MANY]))
+    n, noise = draw(st.integers(2, 6)), 0.0 if flat else draw(st.floats(0.0, 100.0))
+    curves = {}
+    for i, arm in enumerate(("scratch", "fine_tune", "evolution", "zero_shot", "randomised")):
+        start = draw(values)
+        end = start if flat else draw(values)
+        rows = rising(start, end, 3000.0, n, noise, seed=i)
+        curves[arm] = rows if i < 3 else rows[:, :1]
+    return make_study(arms=arms, **curves)
+
+
+law = settings(max_examples=30, deadline=None)
+
+
+@law
+@given(studies())
+def test_a_verdict_needs_three_seeds(study: Study) -> None:
+    text = f"{verdict(study)} {other_arms(study)}"
+    few = study.plan.seeds < 3
+    assert text.count("needs at least 3 seeds") == few
+    assert not (few and JUDGED.search(text))
+
+
+@law
+@given(studies(), values)
+def test_an_untrained_policy_is_no_baseline(study: Study, start: float) -> None:
+    """No arm is called helpful without training, wherever scratch starts."""
+    for sentence in f"{verdict(study)} {other_arms(study)}".split(". "):
+        untrained = re.search("zero-shot|randomised", sentence)
+        assert not (untrained and re.search("helped|hurt", sentence))
+    runs = tuple(
+        msgspec.structs.replace(
+            run,
+            curve=(msgspec.structs.replace(run.curve[0], mean_return=start), *run.curve[1:]),
+        )
+        if run.run.kind == "scratch"
+        else run
+        for run in study.runs
+    )
+    other = msgspec.structs.replace(study, runs=runs)
+    if learned(study, "scratch") and learned(other, "scratch"):
+        assert outcome(other, "zero-shot") == outcome(study, "zero-shot")
+
+
+@law
+@given(studies(), studies(flat=True))
+def test_the_verdict_says_when_nobody_learned(study: Study, flat: Study) -> None:
+    """Without a rise there is no judgement, however far apart the arms are."""
+    assert not any(learned(flat, arm) for arm in flat.plan.arms)
+    for one in (study, flat):
+        nobody = not any(learned(one, arm) for arm in one.plan.arms)
+        assert verdict(one).startswith("No arm learned in 10,240 target steps: ") == nobody
+        assert not (nobody and JUDGED.search(f"{verdict(one)} {other_arms(one)}"))
 
 
 def test_caveats_name_limits_of_the_study() -> None:
@@ -152,11 +232,6 @@ def test_individuals_where_an_arm_is_weak_are_named() -> None:
         "scratch reaches 80% on 1 of 3 fingers, not on finger 0 (0%), finger 1 (60%).",
         "fine-tune reaches 80% on 3 of 3 fingers.",
     ]
-
-
-# Straight lines, so that areas and crossings are easy to compute. Scratch rises from 0 to 1000 in
-# 10,240 steps, and its final value is the mean of the last three evaluations: 900.
-SLOPE = STEPS / STEPS[-1]
 
 
 def by_name(study: Study, arm: str) -> dict[str, MeasureRow]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from textwrap import fill
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from shapechanger.reports import charts
 from shapechanger.reports.numbers import t_interval
 from shapechanger.transfer.methods import load_method
-from shapechanger.transfer.report.verdict import finals
+from shapechanger.transfer.report.verdict import LEAST_SEEDS, finals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,8 +24,10 @@ if TYPE_CHECKING:
 
     from shapechanger.transfer.study import Study
 
-# Fewest seeds for a band: an interval of two seeds is over ten times as wide as their difference.
-_BAND_SEEDS: Final = 3
+# Characters of a line of a legend, which is as wide as a panel; and the height that a chart has for
+# its legend, inches.
+_LABEL_LENGTH: Final = 40
+_LEGEND_HEIGHT: Final = 0.7
 
 Counting = Literal["target", "total"]
 
@@ -87,7 +90,7 @@ def learning_curves(study: Study, *countings: Counting) -> dict[Counting, str]:
         axes.xaxis.set_major_formatter(EngFormatter(sep="\N{THIN SPACE}"))
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.yaxis.set_major_formatter(FuncFormatter(tick))
-        figure.legend(loc="outside lower center", ncols=2, handlelength=2.5)
+        _add_legend(figure, columns=2)
 
     return {
         each: charts.svg_chart(charts.PANEL, partial(draw, counting=each)) for each in countings
@@ -132,7 +135,7 @@ def _draw_arm(axes: Axes, study: Study, arm: str, source_steps: float) -> None:
     else:
         axes.plot(steps, returns.T, color=style.colour, linewidth=0.7, alpha=0.45)
     spread = t_interval(returns)
-    if curves.n_seeds >= _BAND_SEEDS:
+    if curves.n_seeds >= LEAST_SEEDS:
         shade = 0.12 if is_level else 0.18
         axes.fill_between(
             steps, spread.low, spread.high, color=style.colour, alpha=shade, linewidth=0.0
@@ -152,6 +155,26 @@ def _draw_arm(axes: Axes, study: Study, arm: str, source_steps: float) -> None:
         markevery=max(1, curves.n_evals // 8),
         label=f"{arm}, {curves.n_seeds} seeds",
     )
+
+
+def _add_legend(figure: Figure, columns: int) -> None:
+    """Add a legend below the axes, in fewer columns if it is too wide; the figure grows with it."""
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    place = partial(
+        figure.legend,
+        handles,
+        [fill(label, _LABEL_LENGTH) for label in labels],
+        loc="outside lower center",
+        handlelength=2.5,
+    )
+    legend = place(ncols=columns)
+    while legend.get_window_extent().width > 0.97 * figure.bbox.width and columns > 1:
+        legend.remove()
+        columns -= 1
+        legend = place(ncols=columns)
+    width, height = figure.get_size_inches()
+    more = legend.get_window_extent().height / figure.dpi - _LEGEND_HEIGHT
+    figure.set_size_inches(width, height + max(0.0, more))
 
 
 def _axis_label(study: Study) -> str:
@@ -196,6 +219,6 @@ def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
             )
         axes.set_xlabel(xlabel)
         axes.set_ylabel(_axis_label(first))
-        figure.legend(loc="outside lower center", ncols=3, handlelength=2.5)
+        _add_legend(figure, columns=3)
 
     return charts.svg_chart(charts.WIDE, draw)

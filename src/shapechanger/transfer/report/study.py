@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any, Final, cast
@@ -35,7 +36,8 @@ from shapechanger.transfer.study import Study
 Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 """The source's body and the target's, each of shape (height, width, 3)."""
 
-_MAX_ARGUMENT_LENGTH: Final = 40
+# Numbers of simple edits, with the text before them.
+_SIMPLE: Final = {"factor": "x", "scale": "x", "to": ""}
 # Titles of kinds of runs; the title of any other kind is its name.
 _ARMS: Final = {"random": "random actions", "source": "source policy, in the source"}
 
@@ -44,20 +46,20 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
     """Render the report of a study."""
     from shapechanger.transfer.report.curves import learning_curves  # Imports Matplotlib.
 
-    plan = study.plan
+    plan, names = study.plan, labels(study.plan.task.source, study.plan.task.target)
     measures, arms = measure_rows(study), arm_rows(study)
     summary = next(iter(study.summaries.values()))
     notes = list(dict.fromkeys(row.note for row in measures if _defined(row) and row.note))
     return render(
         Path(__file__).with_name("study.html"),
-        title=f"{_short_name(plan.task.source)} → {_short_name(plan.task.target)}",
+        title=" → ".join(names[str(env)] for env in (plan.task.source, plan.task.target)),
         study=study,
         plan=plan,
         verdict=verdict(study),
         other_arms=other_arms(study),
         weak=weak_individuals(study),
         cards=_cards(study, measures),
-        bodies=_bodies(study, pictures) if pictures is not None else [],
+        bodies=_bodies(study, pictures, names) if pictures is not None else [],
         picture_note=picture_note,
         curves=learning_curves(study, "target", "total"),
         measures=[_measure_table(arm, measures, notes) for arm in study.summaries],
@@ -115,28 +117,64 @@ def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
         return both[0].picture(reach=reach), both[1].picture(reach=reach)
 
 
-def _short_name(env: EnvRef) -> str:
-    """The env's name without its namespace, and its arguments, truncated if they are long."""
-    shown: list[str] = []
-    for name, value in env.kwargs.items():
-        words = argument_text(value) if name == "body" else f"{name}={value}"
-        cut = f"{words[: _MAX_ARGUMENT_LENGTH - 1].rstrip()}…"
-        shown.append(words if len(words) <= _MAX_ARGUMENT_LENGTH else cut)
-    arguments = ", ".join(shown)
-    name = env.id.rpartition("/")[2]
-    return f"{name} ({arguments})" if arguments else name
+def labels(*envs: EnvRef) -> dict[str, str]:
+    """Return a label such as `Hopper, leg x0.7` for each env, keyed by the env as text.
+
+    It has all arguments except flags that all envs share, such as `put_back`.
+    """
+    shared = {
+        name
+        for name, value in envs[0].kwargs.items()
+        if isinstance(value, bool) and all(env.kwargs.get(name) is value for env in envs)
+    }
+    return {str(env): _label(env, shared) for env in envs}
 
 
-def argument_text(value: object) -> str:
-    """Format an argument of an env; JSON of edits becomes text such as `stretch pole x3`."""
+def _label(env: EnvRef, without: set[str]) -> str:
+    name, words = env.id.rpartition("/")[2].removesuffix("-v1"), list[str]()
+    for key, value in env.kwargs.items():
+        noun = key.replace("_", " ")
+        if key == "path":  # The file of a user's robot says more than the env's name.
+            name = str(value)
+        elif key in {"body", "task"}:
+            words.append(_body_words(value))
+        elif key == "lenses":
+            words += value
+        elif isinstance(value, bool):
+            words += [] if key in without else [noun if value else f"no {noun}"]
+        else:
+            words.append(f"{noun} {value}")
+    return ", ".join((name, *words))
+
+
+def _body_words(body: object) -> str:
+    """Format a body; JSON of edits becomes text such as `pole x3`."""
     try:
-        edits = msgspec.json.decode(str(value), type=list[dict[str, Any]])
+        edits = msgspec.json.decode(str(body), type=list[dict[str, Any]])
     except msgspec.DecodeError:
-        return str(value)
-    return ", ".join(
-        " ".join(f"x{part}" if name == "factor" else str(part) for name, part in edit.items())
-        for edit in edits
-    )
+        return str(body)
+    return ", ".join(map(_edit_words, edits))
+
+
+def _edit_words(edit: dict[str, Any]) -> str:
+    """Format an edit: `leg x0.7` for a stretch, and `torso mass x2` for other simple edits."""
+    kind = str(edit.get("edit")).replace("_", " ")
+    names = [value for key, value in edit.items() if isinstance(value, str) and key != "edit"]
+    numbers = {key: value for key, value in edit.items() if not isinstance(value, str)}
+    if len(names) > 1 or len(numbers) != 1 or not numbers.keys() <= _SIMPLE.keys():
+        more = (f"{key} {_value_text(value)}" for key, value in numbers.items())
+        return " ".join((kind, *names, *more))
+    ((key, value),) = numbers.items()
+    # `shank_*` are all shanks.
+    nouns = [name.removesuffix("_*") for name in names if name != "*"]
+    kinds = [] if nouns and kind == "stretch" else [kind]
+    return " ".join((*nouns, *kinds, f"{_SIMPLE[key]}{_value_text(value)}"))
+
+
+def _value_text(value: Any) -> str:
+    if isinstance(value, list):
+        return " ".join(map(_value_text, cast("list[Any]", value)))
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
 
 
 def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str]]:
@@ -160,7 +198,7 @@ def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str
     return cards
 
 
-def _bodies(study: Study, pictures: Pictures) -> list[dict[str, Any]]:
+def _bodies(study: Study, pictures: Pictures, names: Mapping[str, str]) -> list[dict[str, Any]]:
     plan = study.plan
     ours = plan.body_map
     sides = (
@@ -170,8 +208,8 @@ def _bodies(study: Study, pictures: Pictures) -> list[dict[str, Any]]:
     return [
         {
             "picture": picture,
-            "caption": f"{side}: {_short_name(env)}, {_plural(observation.size, 'observation')}, "
-            f"{_plural(action.size, 'action')}",
+            "caption": f"{side}: {names[str(env)]} ({_plural(observation.size, 'observation')}, "
+            f"{_plural(action.size, 'action')})",
             "alt": f"The body of {env}",
         }
         for picture, (side, env, observation, action) in zip(pictures, sides, strict=True)
@@ -206,16 +244,17 @@ def _measure_table(arm: str, rows: tuple[MeasureRow, ...], notes: list[str]) -> 
 
 
 def _terms(arms: tuple[ArmRow, ...]) -> dict[str, Any]:
-    """Return the reward terms of each kind of run; without rows if the env reports none."""
+    """Return a row of reward terms for each kind of run; without rows if the env reports none."""
     names = dict.fromkeys(name for row in arms for name in row.terms)
     return {
-        "header": ("Term", *(_ARMS.get(row.kind, row.kind).partition(",")[0] for row in arms)),
+        "header": ("Runs", *(name.removeprefix("reward_") for name in names)),
         "rows": [
             (
-                name.removeprefix("reward_"),
-                *(number(row.terms[name]) if name in row.terms else "none" for row in arms),
+                _ARMS.get(row.kind, row.kind),
+                *(number(row.terms[name]) if name in row.terms else "none" for name in names),
             )
-            for name in names
+            for row in arms
+            if names
         ],
     }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -9,7 +10,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
 from shapechanger.reports.numbers import count, number
 from shapechanger.reports.page import render
@@ -19,15 +19,16 @@ from shapechanger.transfer.metrics.intervals import (
     interquartile_mean,
     probability_of_improvement,
 )
-from shapechanger.transfer.metrics.measures import jumpstart, total_reward_gain
-from shapechanger.transfer.report.study import argument_text
+from shapechanger.transfer.report.study import labels
 from shapechanger.transfer.report.verdict import (
-    direction,
+    LEAST_SEEDS,
     estimate_text,
     finals,
-    is_flat,
+    finding,
+    gain_over_scratch,
     machine_text,
-    verdict,
+    more_seeds,
+    outcome,
 )
 from shapechanger.transfer.study import Study
 
@@ -36,8 +37,6 @@ _HELPED: Final = (0, 114, 178)
 _HURT: Final = (213, 94, 0)
 # Largest share of the full colour, so that black text can be read on it.
 _STRONGEST: Final = 0.55
-# Fewest runs of a study for which the page shows bootstrap intervals.
-_LEAST_RUNS: Final = 3
 
 
 class FilmStrip(NamedTuple):
@@ -71,6 +70,8 @@ def suite_html(
 
     first = next(iter(studies.values()))
     arm, plan = first.headline_arm, first.plan
+    tasks = [study.plan.task for study in studies.values()]
+    names = labels(*(env for task in tasks for env in (task.source, task.target)))
     swept = sweep and sweep_chart(
         {sweep.values[one]: study for one, study in studies.items()}, sweep.name
     )
@@ -78,17 +79,20 @@ def suite_html(
         Path(__file__).with_name("suite.html"),
         title=name,
         arm=arm,
+        basis="scratch, averaged over the target steps"
+        if first.curves(arm).n_evals > 1
+        else "the end of scratch, without training",
         measure=plan.measure,
         unit="" if plan.unit == "1" else plan.unit,
         verdict=_verdict(studies),
         looks=_looks(studies, seeds),
-        matrix=_matrix(studies),
+        matrix=_matrix(studies, names),
         sweep=swept,
-        methods=_methods(studies),
+        methods=_methods(studies, names),
         studies=[
             {
                 "name": one,
-                "verdict": verdict(study),
+                "finding": finding(study),
                 "curves": learning_curves(study, "target")["target"],
                 "film": (films or {}).get(one, ""),
                 "strips": [(strip.caption, strip.jpeg) for strip in (strips or {}).get(one, ())],
@@ -100,26 +104,21 @@ def suite_html(
 
 
 def _verdict(studies: Mapping[str, Study]) -> str:
-    found = [direction(gain_over_scratch(study)) for study in studies.values()]
-    flat = sum(is_flat(study) for study in studies.values())
     arm = next(iter(studies.values())).headline_arm
-    over = "one study" if len(found) == 1 else f"{len(found)} studies"
-    words = (
-        f"Over {over}, {arm} is ahead of scratch in {found.count('up')}, behind in "
-        f"{found.count('down')}, and without a clear difference in {found.count('unclear')}"
-    )
-    return f"{words}; {flat} show nothing." if flat else f"{words}."
-
-
-def gain_over_scratch(study: Study) -> Estimate:
-    """Advantage of the headline arm over scratch, averaged over the budget, in the measure's unit.
-
-    For an arm that is not trained on the target, it is the advantage at the start.
-    """
-    arm = study.curves(study.headline_arm)
-    if arm.n_evals > 1:
-        return total_reward_gain(arm, study.curves("scratch"))
-    return jumpstart(arm, study.curves("scratch"))
+    found = Counter(outcome(study, study.headline_arm) for study in studies.values())
+    over = "one study" if len(studies) == 1 else f"{len(studies)} studies"
+    sentences: list[str] = []
+    if found["too few"] < len(studies):
+        words = (
+            f"Over {over}, {arm} is ahead of scratch in {found['up']}, behind in {found['down']}, "
+            f"and without a clear difference in {found['unclear']}"
+        )
+        more = {"unlearned": "neither learned in", "no interval": "there is no interval in"}
+        parts = [words, *(f"{text} {found[one]}" for one, text in more.items() if found[one])]
+        sentences.append(f"{'; '.join(parts)}.")
+    if found["too few"]:
+        sentences.append(more_seeds("suite"))
+    return " ".join(sentences)
 
 
 def _looks(studies: Mapping[str, Study], declared: int) -> str:
@@ -145,19 +144,20 @@ def _listed(numbers: Sequence[int]) -> str:
     return " and ".join(str(each) for each in dict.fromkeys(numbers))
 
 
-def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
+def _matrix(studies: Mapping[str, Study], names: Mapping[str, str]) -> dict[str, Any] | None:
     """Return a table of gains by source and target; None if there are too few pairs for one."""
-    sources = list(dict.fromkeys(_name(study.plan.task.source) for study in studies.values()))
-    targets = list(dict.fromkeys(_name(study.plan.task.target) for study in studies.values()))
+    pairs = {
+        (names[str(study.plan.task.source)], names[str(study.plan.task.target)]): (one, study)
+        for one, study in studies.items()
+    }
+    sources, targets = (list(dict.fromkeys(pair[side] for pair in pairs)) for side in (0, 1))
     if len(sources) < 2 or len(studies) < 3:
         return None
     # Targets that are also sources come first, in the order of the sources.
     targets.sort(key=lambda one: sources.index(one) if one in sources else len(sources))
-    pairs = {
-        (_name(study.plan.task.source), _name(study.plan.task.target)): (one, study)
-        for one, study in studies.items()
+    gains = {
+        pair: gain_over_scratch(study, study.headline_arm) for pair, (_, study) in pairs.items()
     }
-    gains = {pair: gain_over_scratch(study) for pair, (_, study) in pairs.items()}
     widest = max((abs(gain.value or 0.0) for gain in gains.values()), default=0.0) or 1.0
 
     def colour(share: float) -> str:
@@ -180,11 +180,11 @@ def _matrix(studies: Mapping[str, Study]) -> dict[str, Any] | None:
     return {"sources": sources, "targets": targets, "cells": cells}
 
 
-def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
+def _methods(studies: Mapping[str, Study], names: Mapping[str, str]) -> list[tuple[str, ...]]:
     """Return rows of each arm's scores and chance to beat scratch, by target and in total."""
     by_target: dict[str, list[Study]] = {}
     for study in studies.values():
-        by_target.setdefault(_name(study.plan.task.target), []).append(study)
+        by_target.setdefault(names[str(study.plan.task.target)], []).append(study)
     rows: list[tuple[str, ...]] = []
     merged: dict[str, list[NDArray[np.float64]]] = {}
     for target, some in by_target.items():
@@ -222,7 +222,7 @@ def _method_rows(
     rows: list[tuple[str, ...]] = []
     for arm, groups in scores.items():
         rng = np.random.default_rng(0)
-        few = max(group.size for group in groups) < _LEAST_RUNS
+        few = max(group.size for group in groups) < LEAST_SEEDS
 
         def text(estimate: Estimate, few: bool = few) -> str:
             # If all resamples are equal, they do not define an interval.
@@ -256,16 +256,3 @@ def _settings(studies: Mapping[str, Study]) -> list[tuple[str, str]]:
         ("Runs", count(sum(len(study.runs) for study in studies.values()))),
         ("Versions", ", ".join(f"{name} {version}" for name, version in plans[0].versions.items())),
     ]
-
-
-def _name(env: EnvRef) -> str:
-    """The env's name with its arguments, without namespace and version."""
-    short = env.id.rpartition("/")[2].removesuffix("-v1")
-    lenses = env.kwargs.get("lenses") or ""
-    extra = ", ".join(
-        # A flag, such as `put_back`, is equal for all envs of a suite.
-        argument_text(value)
-        for key, value in env.kwargs.items()
-        if key != "lenses" and not isinstance(value, bool)
-    )
-    return " ".join(filter(None, (short, str(lenses) if lenses else "", extra)))

@@ -20,7 +20,13 @@ from shapechanger.reports.numbers import (
 )
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.metrics.intervals import Estimate
-from shapechanger.transfer.metrics.measures import ReachTimes, Summary, TimeToThreshold
+from shapechanger.transfer.metrics.measures import (
+    ReachTimes,
+    Summary,
+    TimeToThreshold,
+    asymptotic_gain,
+    total_reward_gain,
+)
 from shapechanger.transfer.plan import NO_SKILL, SOURCE
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
@@ -239,11 +245,30 @@ def _good(study: Study, kind: str) -> str:
 
 Direction = Literal["up", "down", "unclear"]
 
-_TRANSFER: Final = {"up": "helped", "down": "hurt", "unclear": "made no clear difference"}
-_NO_INTERVAL: Final = "cannot be judged without an interval"
+Outcome = Literal["up", "down", "unclear", "no interval", "unlearned", "too few"]
+
+# Verbs for an arm that is trained on the target, and for one that is compared with trained scratch.
+_TRAINED: Final[dict[Outcome, str]] = {
+    "up": "helped",
+    "down": "hurt",
+    "unclear": "made no clear difference",
+    "no interval": "cannot be judged without an interval",
+    "unlearned": "did not learn",
+    "too few": "cannot be judged yet",
+}
+_UNTRAINED: Final[dict[Outcome, str]] = {
+    "up": "came out ahead of scratch",
+    "down": "stayed behind scratch",
+    "unclear": "did not clearly differ from scratch",
+    "no interval": "cannot be judged without an interval against scratch",
+    "unlearned": "cannot be judged against scratch",
+    "too few": "cannot be judged yet against scratch",
+}
+LEAST_SEEDS: Final = 3
+"""Fewest seeds of a verdict: an interval of two is over ten times as wide as their difference."""
 # With fewer seeds, intervals are so wide that they exclude 0 only for large effects.
 _FEW_SEEDS: Final = 5
-# If no arm ends above the start of scratch by this share of its end, arms are not compared.
+# An arm that rises by less than this share of the best end has not learned.
 _FLAT: Final = 0.1
 
 
@@ -256,77 +281,135 @@ def direction(estimate: Estimate) -> Direction:
     return "unclear"
 
 
-def _outcome(estimate: Estimate) -> str:
-    """Return the verdict's verb phrase."""
-    if estimate.value is not None and estimate.low is None:
-        return _NO_INTERVAL
-    return _TRANSFER[direction(estimate)]
+def learned(study: Study, arm: str) -> bool:
+    """Return whether an arm ends clearly above its own start.
+
+    It must rise by a tenth of the best arm's end, and by twice the standard error of scratch's
+    start. An arm that is not trained on the target never learned.
+    """
+    curves, untrained = study.curves(arm), study.curves("scratch").returns[:, 0]
+    end = float(finals(study, arm).mean())
+    best = max(float(finals(study, one).mean()) for one in study.plan.arms)
+    noise = 2.0 * float(untrained.std(ddof=1)) / untrained.size**0.5
+    rise = end - float(curves.returns[:, 0].mean())
+    return curves.n_evals > 1 and rise > max(_FLAT * abs(end), _FLAT * abs(best), noise)
+
+
+def gain_over_scratch(study: Study, arm: str) -> Estimate:
+    """Advantage of an arm over scratch, by which it is judged, in the unit of the measure.
+
+    It is averaged over the budget. An arm that is not trained on the target is compared with the
+    end of scratch, because being ahead of an untrained policy is no success.
+    """
+    ours, scratch = study.curves(arm), study.curves("scratch")
+    if ours.n_evals > 1:
+        return total_reward_gain(ours, scratch)
+    return asymptotic_gain(ours, scratch, last_k=min(study.plan.last_k, scratch.n_evals))
+
+
+def outcome(study: Study, arm: str) -> Outcome:
+    """Return the outcome for an arm, by the rule of all verdicts.
+
+    A study with fewer than three seeds has no verdict, nor has an arm if neither it nor scratch
+    learned.
+    """
+    if study.plan.seeds < LEAST_SEEDS:
+        return "too few"
+    if not learned(study, arm) and not learned(study, "scratch"):
+        return "unlearned"
+    gain = gain_over_scratch(study, arm)
+    return "no interval" if gain.low is None else direction(gain)
 
 
 def verdict(study: Study) -> str:
-    """State in one sentence of at most 25 words whether transfer helped.
+    """State the finding in one sentence, and in a second one if more seeds are needed."""
+    few = study.plan.seeds < LEAST_SEEDS
+    return f"{finding(study)} {more_seeds('study')}" if few else finding(study)
 
-    The headline arm is judged by its total reward gain in target steps, a measure chosen in
-    advance, or by its jumpstart if it is not trained on the target. If no arm ends well above the
-    start of scratch, the sentence states that the study shows nothing.
-    """
-    arm, plan = study.headline_arm, study.plan
-    scratch, text = study.curves("scratch"), partial(_mean_text, unit=plan.unit)
-    if is_flat(study):
-        return (
-            f"This budget or measure shows nothing: scratch's {plan.measure} starts at "
-            f"{text(scratch.returns[:, 0])} and ends at {text(finals(study, 'scratch'))}."
-        )
-    curves, measures = study.curves(arm), study.summaries[arm].in_target_steps
-    if curves.n_evals == 1:
-        return (
-            f"Transfer {_outcome(measures.jumpstart)} at the start: untrained on the "
-            f"target, {arm}'s {plan.measure} is {text(curves.returns)} and scratch's "
-            f"{text(scratch.returns[:, 0])}."
-        )
+
+def more_seeds(what: str) -> str:
+    """Return how to add the seeds that a verdict on a study or a suite needs."""
     return (
-        f"Transfer {_outcome(measures.total_reward_gain)}: over {count(plan.steps)} "
-        f"target steps {arm}'s {plan.measure} averages {text(curves.auc())} and scratch's "
-        f"{text(scratch.auc())}."
+        f"A verdict needs at least {LEAST_SEEDS} seeds: run the same {what} again with --seeds 5, "
+        "and it keeps these runs and adds the others."
     )
 
 
-def other_arms(study: Study) -> str:
-    """State in one sentence whether the arms other than scratch and the headline arm helped.
+def finding(study: Study) -> str:
+    """State in one sentence of about 25 words whether transfer helped.
 
-    Each arm is judged by its total reward gain in target steps, or by its jumpstart if it does not
-    learn on the target. The parentheses contain its measure, averaged over the budget. The sentence
-    is empty if there are no such arms, or the study shows nothing.
+    The headline arm is judged by its gain over scratch, a measure chosen in advance. With fewer
+    than three seeds the sentence states the means only, and if no arm learned, it says so.
     """
-    others: dict[str, list[str]] = {found: [] for found in (*_TRANSFER.values(), _NO_INTERVAL)}
-    for arm, summary in study.summaries.items():
-        if arm != study.headline_arm:
-            measures, curves = summary.in_target_steps, study.curves(arm)
-            learns = curves.n_evals > 1
-            estimate = measures.total_reward_gain if learns else measures.jumpstart
-            values = curves.auc() if learns else curves.returns
-            others[_outcome(estimate)].append(f"{arm} ({_mean_text(values, study.plan.unit)})")
-    parts = [
-        f"{' and '.join(filter(None, (', '.join(arms[:-1]), arms[-1])))} {found}"
-        for found, arms in others.items()
-        if arms
-    ]
-    if is_flat(study) or not parts:
+    arm, plan, few = study.headline_arm, study.plan, study.plan.seeds < LEAST_SEEDS
+    curves, scratch, text = study.curves(arm), study.curves("scratch"), partial(_mean, plan.unit)
+    budget, change = f"{count(plan.steps)} target steps", _change(study, "scratch")
+    if not learned(study, arm) and not learned(study, "scratch"):
+        others = any(learned(study, one) for one in plan.arms)
+        who = f"Neither scratch nor {arm}" if others else "No arm"
+        return (
+            f"{who} learned in {budget}: scratch's {plan.measure} {change}, and {arm}'s "
+            f"{_change(study, arm)}."
+        )
+    if curves.n_evals > 1:
+        head = f"Transfer {_TRAINED[outcome(study, arm)]}"
+        words = f"over {budget} {arm}'s {plan.measure} averaged {text(curves.auc())}"
+        words += f" and scratch's {text(scratch.auc())}."
+    else:
+        head = f"{arm.capitalize()} {_UNTRAINED[outcome(study, arm)]}"
+        words = f"{arm}'s {plan.measure} {_change(study, arm)}, and scratch's {change} in {budget}."
+    return f"{words[0].upper()}{words[1:]}" if few else f"{head}: {words}"
+
+
+def other_arms(study: Study) -> str:
+    """State whether the arms other than scratch and the headline arm helped.
+
+    One sentence is about arms that are trained on the target, with the measure averaged over the
+    budget in parentheses. Another compares the other arms with scratch before and after training.
+    The text is empty if there are no such arms, or if no arm learned.
+    """
+    plan = study.plan
+    others = [arm for arm in study.summaries if arm != study.headline_arm]
+    if not any(learned(study, arm) for arm in plan.arms):
         return ""
-    return f"Of the other arms, {'; '.join(parts)}."
+    trained: dict[str, list[str]] = {found: [] for found in _TRAINED.values()}
+    untrained: dict[str, list[str]] = {found: [] for found in _UNTRAINED.values()}
+    for arm in others:
+        curves, found = study.curves(arm), outcome(study, arm)
+        if curves.n_evals > 1:
+            trained[_TRAINED[found]].append(f"{arm} ({_mean(plan.unit, curves.auc())})")
+        else:
+            value = _mean(plan.unit, curves.returns)
+            untrained[_UNTRAINED[found]].append(f"{arm} ({value})")
+    sentences: list[str] = []
+    if parts := _listed(trained):
+        sentences.append(f"Of the other arms, {parts}.")
+    if parts := _listed(untrained):
+        change = _change(study, "scratch")
+        sentences.append(f"Without training, {parts}, which {change} in training.")
+    return " ".join(sentences)
 
 
-def _mean_text(values: NDArray[np.float64], unit: str) -> str:
+def _listed(arms: dict[str, list[str]]) -> str:
+    """Return all arms before their verbs."""
+    return "; ".join(
+        f"{' and '.join(filter(None, (', '.join(some[:-1]), some[-1])))} {verb}"
+        for verb, some in arms.items()
+        if some
+    )
+
+
+def _change(study: Study, arm: str) -> str:
+    """Return the mean before and after training, or without training."""
+    values, text = study.curves(arm).returns, partial(_mean, study.plan.unit)
+    if values.shape[1] == 1:
+        return f"was {text(values)} without training"
+    return f"went from {text(values[:, 0])} to {text(finals(study, arm))}"
+
+
+def _mean(unit: str, values: NDArray[np.float64]) -> str:
     mean = f"{float(f'{values.mean():.3g}'):,.10g}"
     return mean if unit == "1" else f"{mean} {unit}"
-
-
-def is_flat(study: Study) -> bool:
-    """Return whether neither scratch nor another arm ends well above the start of scratch."""
-    start = float(study.curves("scratch").returns[:, 0].mean())
-    end = float(finals(study, "scratch").mean())
-    best = max(float(finals(study, arm).mean()) for arm in study.plan.arms)
-    return max(end, best) - start <= _FLAT * max(abs(end), abs(best))
 
 
 def devices_of(study: Study) -> dict[str, list[str]]:
