@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
     from shapechanger.transfer.study import Study
 
-# Characters of a line of a legend, which is as wide as a panel; and the height that a chart has for
-# its legend, inches.
+# Most characters of a line of a legend, and the height that a chart has for its legend, inches.
 _LABEL_LENGTH: Final = 40
 _LEGEND_HEIGHT: Final = 0.7
 
@@ -158,23 +157,16 @@ def _draw_arm(axes: Axes, study: Study, arm: str, source_steps: float) -> None:
 
 
 def _add_legend(figure: Figure, columns: int) -> None:
-    """Add a legend below the axes, in fewer columns if it is too wide; the figure grows with it."""
+    """Add a legend below the axes, in one column if it is too wide; the figure grows with it."""
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    place = partial(
-        figure.legend,
-        handles,
-        [fill(label, _LABEL_LENGTH) for label in labels],
-        loc="outside lower center",
-        handlelength=2.5,
-    )
+    texts = [fill(label, _LABEL_LENGTH) for label in labels]
+    place = partial(figure.legend, handles, texts, loc="outside lower center", handlelength=2.5)
     legend = place(ncols=columns)
-    while legend.get_window_extent().width > 0.97 * figure.bbox.width and columns > 1:
+    if legend.get_window_extent().width > 0.97 * figure.bbox.width:
         legend.remove()
-        columns -= 1
-        legend = place(ncols=columns)
-    width, height = figure.get_size_inches()
+        legend = place(ncols=1)
     more = legend.get_window_extent().height / figure.dpi - _LEGEND_HEIGHT
-    figure.set_size_inches(width, height + max(0.0, more))
+    figure.set_figheight(figure.get_figheight() + max(0.0, more))
 
 
 def _axis_label(study: Study) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -36,7 +36,7 @@ from shapechanger.transfer.study import Study
 Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 """The source's body and the target's, each of shape (height, width, 3)."""
 
-# Numbers of simple edits, with the text before them.
+# Text before the numbers of simple edits.
 _SIMPLE: Final = {"factor": "x", "scale": "x", "to": ""}
 # Titles of kinds of runs; the title of any other kind is its name.
 _ARMS: Final = {"random": "random actions", "source": "source policy, in the source"}
@@ -122,59 +122,42 @@ def labels(*envs: EnvRef) -> dict[str, str]:
 
     It has all arguments except flags that all envs share, such as `put_back`.
     """
-    shared = {
-        name
-        for name, value in envs[0].kwargs.items()
-        if isinstance(value, bool) and all(env.kwargs.get(name) is value for env in envs)
-    }
+    flags = {name for name, value in envs[0].kwargs.items() if isinstance(value, bool)}
+    shared = {name for name in flags if len({str(env.kwargs.get(name)) for env in envs}) == 1}
     return {str(env): _label(env, shared) for env in envs}
 
 
-def _label(env: EnvRef, without: set[str]) -> str:
-    name, words = env.id.rpartition("/")[2].removesuffix("-v1"), list[str]()
-    for key, value in env.kwargs.items():
-        noun = key.replace("_", " ")
-        if key == "path":  # The file of a user's robot says more than the env's name.
-            name = str(value)
-        elif key in {"body", "task"}:
-            words.append(_body_words(value))
-        elif key == "lenses":
-            words += value
-        elif isinstance(value, bool):
-            words += [] if key in without else [noun if value else f"no {noun}"]
-        else:
-            words.append(f"{noun} {value}")
-    return ", ".join((name, *words))
+def _label(env: EnvRef, shared: set[str]) -> str:
+    # The file of a user's robot says more than the env's name.
+    name = env.kwargs.get("path", env.id.rpartition("/")[2].removesuffix("-v1"))
+    own = [(key, value) for key, value in env.kwargs.items() if key not in {*shared, "path"}]
+    return ", ".join([name, *(_argument(key, value) for key, value in own)])
 
 
-def _body_words(body: object) -> str:
-    """Format a body; JSON of edits becomes text such as `pole x3`."""
-    try:
-        edits = msgspec.json.decode(str(body), type=list[dict[str, Any]])
-    except msgspec.DecodeError:
-        return str(body)
-    return ", ".join(map(_edit_words, edits))
+def _argument(name: str, value: Any) -> str:
+    """Format an argument of an env; JSON of edits becomes text such as `pole x3`."""
+    if name == "body":
+        with suppress(msgspec.DecodeError):
+            edits = msgspec.json.decode(str(value), type=list[dict[str, Any]])
+            return ", ".join(map(_edit, edits))
+    known = name in {"body", "lenses", "task"}
+    return f"{'' if known else name.replace('_', ' ') + ' '}{_setting(value)}"
 
 
-def _edit_words(edit: dict[str, Any]) -> str:
+def _edit(edit: dict[str, Any]) -> str:
     """Format an edit: `leg x0.7` for a stretch, and `torso mass x2` for other simple edits."""
-    kind = str(edit.get("edit")).replace("_", " ")
-    names = [value for key, value in edit.items() if isinstance(value, str) and key != "edit"]
-    numbers = {key: value for key, value in edit.items() if not isinstance(value, str)}
-    if len(names) > 1 or len(numbers) != 1 or not numbers.keys() <= _SIMPLE.keys():
-        more = (f"{key} {_value_text(value)}" for key, value in numbers.items())
-        return " ".join((kind, *names, *more))
-    ((key, value),) = numbers.items()
-    # `shank_*` are all shanks.
-    nouns = [name.removesuffix("_*") for name in names if name != "*"]
-    kinds = [] if nouns and kind == "stretch" else [kind]
-    return " ".join((*nouns, *kinds, f"{_SIMPLE[key]}{_value_text(value)}"))
-
-
-def _value_text(value: Any) -> str:
-    if isinstance(value, list):
-        return " ".join(map(_value_text, cast("list[Any]", value)))
-    return f"{value:.15g}" if isinstance(value, float) else str(value)
+    kind = edit["edit"].replace("_", " ")
+    names = [value for key, value in edit.items() if key != "edit" and isinstance(value, str)]
+    numbers = [
+        f"{_SIMPLE.get(key, f'{key} ')}{_setting(value)}"
+        for key, value in edit.items()
+        if not isinstance(value, str)
+    ]
+    if len(names) > 1 or not edit.keys() <= {"edit", "body", "element", *_SIMPLE}:
+        return " ".join([kind, *names, *numbers])
+    # `shank_*` is every shank.
+    nouns = [name.removesuffix("*").removesuffix("_") for name in names]
+    return " ".join(filter(None, [*nouns, "" if kind == "stretch" else kind, *numbers]))
 
 
 def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str]]:
@@ -302,8 +285,10 @@ def _unused(ours: BodyMap) -> list[str]:
 
 
 def _setting(value: Any) -> str:
-    if isinstance(value, tuple):
-        return ", ".join(map(str, cast("tuple[object, ...]", value)))
+    if isinstance(value, tuple | list):
+        return ", ".join(map(_setting, cast("list[Any]", value)))
+    if isinstance(value, float):
+        return f"{value:.15g}"
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:,}" if isinstance(value, int) else str(value)

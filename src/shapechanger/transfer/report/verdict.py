@@ -247,22 +247,14 @@ Direction = Literal["up", "down", "unclear"]
 
 Outcome = Literal["up", "down", "unclear", "no interval", "unlearned", "too few"]
 
-# Verbs for an arm that is trained on the target, and for one that is compared with trained scratch.
-_TRAINED: Final[dict[Outcome, str]] = {
-    "up": "helped",
-    "down": "hurt",
-    "unclear": "made no clear difference",
-    "no interval": "cannot be judged without an interval",
-    "unlearned": "did not learn",
-    "too few": "cannot be judged yet",
-}
-_UNTRAINED: Final[dict[Outcome, str]] = {
-    "up": "came out ahead of scratch",
-    "down": "stayed behind scratch",
-    "unclear": "did not clearly differ from scratch",
-    "no interval": "cannot be judged without an interval against scratch",
-    "unlearned": "cannot be judged against scratch",
-    "too few": "cannot be judged yet against scratch",
+# Verbs for an arm that is trained on the target, and for another arm.
+_VERBS: Final[dict[Outcome, tuple[str, str]]] = {
+    "up": ("helped", "came out ahead of scratch"),
+    "down": ("hurt", "stayed behind scratch"),
+    "unclear": ("made no clear difference", "did not clearly differ from scratch"),
+    "no interval": ("cannot be judged without an interval", "cannot be judged without an interval"),
+    "unlearned": ("did not learn", "cannot be judged"),
+    "too few": ("cannot be judged yet", "cannot be judged yet"),
 }
 LEAST_SEEDS: Final = 3
 """Fewest seeds of a verdict: an interval of two is over ten times as wide as their difference."""
@@ -282,24 +274,22 @@ def direction(estimate: Estimate) -> Direction:
 
 
 def learned(study: Study, arm: str) -> bool:
-    """Return whether an arm ends clearly above its own start.
+    """Return whether an arm rose in training: by a tenth of the best end, and by more than noise.
 
-    It must rise by a tenth of the best arm's end, and by twice the standard error of scratch's
-    start. An arm that is not trained on the target never learned.
+    The noise is twice the standard error of scratch's start.
     """
     curves, untrained = study.curves(arm), study.curves("scratch").returns[:, 0]
-    end = float(finals(study, arm).mean())
-    best = max(float(finals(study, one).mean()) for one in study.plan.arms)
+    ends = {one: float(finals(study, one).mean()) for one in study.plan.arms}
+    least = _FLAT * max(abs(ends[arm]), abs(max(ends.values())))
     noise = 2.0 * float(untrained.std(ddof=1)) / untrained.size**0.5
-    rise = end - float(curves.returns[:, 0].mean())
-    return curves.n_evals > 1 and rise > max(_FLAT * abs(end), _FLAT * abs(best), noise)
+    return ends[arm] - float(curves.returns[:, 0].mean()) > max(least, noise)
 
 
 def gain_over_scratch(study: Study, arm: str) -> Estimate:
-    """Advantage of an arm over scratch, by which it is judged, in the unit of the measure.
+    """Advantage of an arm over scratch averaged over the budget, in the unit of the measure.
 
-    It is averaged over the budget. An arm that is not trained on the target is compared with the
-    end of scratch, because being ahead of an untrained policy is no success.
+    An arm without training on the target is compared with the end of scratch, because being ahead
+    of an untrained policy is no success.
     """
     ours, scratch = study.curves(arm), study.curves("scratch")
     if ours.n_evals > 1:
@@ -308,11 +298,7 @@ def gain_over_scratch(study: Study, arm: str) -> Estimate:
 
 
 def outcome(study: Study, arm: str) -> Outcome:
-    """Return the outcome for an arm, by the rule of all verdicts.
-
-    A study with fewer than three seeds has no verdict, nor has an arm if neither it nor scratch
-    learned.
-    """
+    """Judge an arm, unless there are fewer than three seeds, or neither it nor scratch learned."""
     if study.plan.seeds < LEAST_SEEDS:
         return "too few"
     if not learned(study, arm) and not learned(study, "scratch"):
@@ -338,77 +324,70 @@ def more_seeds(what: str) -> str:
 def finding(study: Study) -> str:
     """State in one sentence of about 25 words whether transfer helped.
 
-    The headline arm is judged by its gain over scratch, a measure chosen in advance. With fewer
-    than three seeds the sentence states the means only, and if no arm learned, it says so.
+    With fewer than three seeds the sentence has means only, and if no arm learned, it says so.
     """
-    arm, plan, few = study.headline_arm, study.plan, study.plan.seeds < LEAST_SEEDS
-    curves, scratch, text = study.curves(arm), study.curves("scratch"), partial(_mean, plan.unit)
-    budget, change = f"{count(plan.steps)} target steps", _change(study, "scratch")
+    arm, plan = study.headline_arm, study.plan
+    budget, found = f"{count(plan.steps)} target steps", outcome(study, arm)
+    ours, scratch = _change(study, arm), _change(study, "scratch")
     if not learned(study, arm) and not learned(study, "scratch"):
         others = any(learned(study, one) for one in plan.arms)
         who = f"Neither scratch nor {arm}" if others else "No arm"
-        return (
-            f"{who} learned in {budget}: scratch's {plan.measure} {change}, and {arm}'s "
-            f"{_change(study, arm)}."
+        return f"{who} learned in {budget}: scratch's {plan.measure} {scratch}, and {arm}'s {ours}."
+    if _is_trained(study, arm):
+        head, words = (
+            f"Transfer {_VERBS[found][0]}",
+            f"over {budget} {arm}'s {plan.measure} averaged ",
         )
-    if curves.n_evals > 1:
-        head = f"Transfer {_TRAINED[outcome(study, arm)]}"
-        words = f"over {budget} {arm}'s {plan.measure} averaged {text(curves.auc())}"
-        words += f" and scratch's {text(scratch.auc())}."
+        words += f"{_height(study, arm)} and scratch's {_height(study, 'scratch')}."
     else:
-        head = f"{arm.capitalize()} {_UNTRAINED[outcome(study, arm)]}"
-        words = f"{arm}'s {plan.measure} {_change(study, arm)}, and scratch's {change} in {budget}."
-    return f"{words[0].upper()}{words[1:]}" if few else f"{head}: {words}"
+        head = f"{arm.capitalize()} {_VERBS[found][1]}"
+        words = f"{arm}'s {plan.measure} {ours}, and scratch's {scratch} in {budget}."
+    return f"{words[0].upper()}{words[1:]}" if found == "too few" else f"{head}: {words}"
 
 
 def other_arms(study: Study) -> str:
-    """State whether the arms other than scratch and the headline arm helped.
+    """Judge the arms other than scratch and the headline arm; empty if no arm learned.
 
     One sentence is about arms that are trained on the target, with the measure averaged over the
-    budget in parentheses. Another compares the other arms with scratch before and after training.
-    The text is empty if there are no such arms, or if no arm learned.
+    budget in parentheses. Another compares the other arms with scratch.
     """
-    plan = study.plan
-    others = [arm for arm in study.summaries if arm != study.headline_arm]
-    if not any(learned(study, arm) for arm in plan.arms):
+    if not any(learned(study, arm) for arm in study.plan.arms):
         return ""
-    trained: dict[str, list[str]] = {found: [] for found in _TRAINED.values()}
-    untrained: dict[str, list[str]] = {found: [] for found in _UNTRAINED.values()}
-    for arm in others:
-        curves, found = study.curves(arm), outcome(study, arm)
-        if curves.n_evals > 1:
-            trained[_TRAINED[found]].append(f"{arm} ({_mean(plan.unit, curves.auc())})")
-        else:
-            value = _mean(plan.unit, curves.returns)
-            untrained[_UNTRAINED[found]].append(f"{arm} ({value})")
-    sentences: list[str] = []
-    if parts := _listed(trained):
-        sentences.append(f"Of the other arms, {parts}.")
-    if parts := _listed(untrained):
-        change = _change(study, "scratch")
-        sentences.append(f"Without training, {parts}, which {change} in training.")
-    return " ".join(sentences)
-
-
-def _listed(arms: dict[str, list[str]]) -> str:
-    """Return all arms before their verbs."""
-    return "; ".join(
-        f"{' and '.join(filter(None, (', '.join(some[:-1]), some[-1])))} {verb}"
-        for verb, some in arms.items()
-        if some
+    parts: tuple[dict[str, list[str]], ...] = ({}, {})
+    for arm in study.summaries:
+        untrained = not _is_trained(study, arm)
+        if arm != study.headline_arm:
+            verb = _VERBS[outcome(study, arm)][untrained]
+            parts[untrained].setdefault(verb, []).append(f"{arm} ({_height(study, arm)})")
+    trained, untrained = (
+        "; ".join(f"{' and '.join(arms)} {verb}" for verb, arms in part.items()) for part in parts
+    )
+    scratch = f"scratch {_change(study, 'scratch')} in training"
+    return " ".join(
+        ([f"Of the other arms, {trained}."] if trained else [])
+        + ([f"Without training, {untrained}; {scratch}."] if untrained else [])
     )
 
 
+def _is_trained(study: Study, arm: str) -> bool:
+    return study.curves(arm).n_evals > 1
+
+
+def _height(study: Study, arm: str) -> str:
+    """Return the mean over the budget, or the mean of an arm without training."""
+    curves = study.curves(arm)
+    return _mean(study, curves.auc() if curves.n_evals > 1 else curves.returns)
+
+
 def _change(study: Study, arm: str) -> str:
-    """Return the mean before and after training, or without training."""
-    values, text = study.curves(arm).returns, partial(_mean, study.plan.unit)
-    if values.shape[1] == 1:
-        return f"was {text(values)} without training"
-    return f"went from {text(values[:, 0])} to {text(finals(study, arm))}"
+    if not _is_trained(study, arm):
+        return f"was {_height(study, arm)} without training"
+    start = _mean(study, study.curves(arm).returns[:, 0])
+    return f"went from {start} to {_mean(study, finals(study, arm))}"
 
 
-def _mean(unit: str, values: NDArray[np.float64]) -> str:
-    mean = f"{float(f'{values.mean():.3g}'):,.10g}"
+def _mean(study: Study, values: NDArray[np.float64]) -> str:
+    mean, unit = f"{float(f'{values.mean():.3g}'):,.10g}", study.plan.unit
     return mean if unit == "1" else f"{mean} {unit}"
 
 
