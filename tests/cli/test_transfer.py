@@ -54,7 +54,7 @@ def test_a_study_is_one_command(quick: tuple[Path, subprocess.CompletedProcess[s
     out, done = quick
     assert done.returncode == 0, done.stderr
     assert "Jumpstart" in done.stdout
-    assert "over 3,072 target steps fine-tune's return averages" in done.stdout
+    assert "A verdict needs at least 3 seeds: run the same study again" in done.stdout
     report = (out / "report.html").read_text()
     assert "pole: length 0.6 m" in report
     assert 'src="http' not in report

@@ -73,22 +73,15 @@ def summary_of(
 @law
 @given(pair=pairs())
 def test_differences_are_antisymmetric(difference: Difference, pair: Pair) -> None:
-    """Swapping the arms negates estimates and intervals."""
+    """Swapping the arms negates estimates and intervals; no arm gains on itself."""
     arm, scratch = pair
+    assert value(difference(arm, arm)) == 0.0
     there, back = difference(arm, scratch), difference(scratch, arm)
     assert value(there) == -value(back)
     if there.low is None:
         assert back.low is None
     else:
         np.testing.assert_allclose([there.low, there.high], [-back.high, -back.low], rtol=1e-9)
-
-
-@differences
-@law
-@given(pair=pairs())
-def test_no_arm_gains_on_itself(difference: Difference, pair: Pair) -> None:
-    """Identity: every gain of an arm over itself is zero."""
-    assert value(difference(pair[0], pair[0])) == 0.0
 
 
 @law
@@ -143,7 +136,7 @@ def test_a_better_arm_never_gains_less(
 @law
 @given(pair=pairs(), threshold=heights, source=source_steps)
 def test_restricted_times_stay_within_the_budget(pair: Pair, threshold: float, source: int) -> None:
-    """Times lie in [0, horizon]; seeds that never reach the threshold are censored."""
+    """Times are in [0, horizon]; others are censored. A higher threshold is never sooner."""
     arm, scratch = pair
     counted = in_total_steps(arm, source, -1e4)
     times = time_to_threshold(counted, scratch, threshold)
@@ -154,14 +147,7 @@ def test_restricted_times_stay_within_the_budget(pair: Pair, threshold: float, s
         assert (reached.restricted_median is None) == (reached.fraction < 0.5)
     steps: NDArray[np.float64] = steps_to_reach(counted, threshold)
     assert np.all((steps <= arm.horizon) | np.isinf(steps))
-
-
-@law
-@given(pair=pairs())
-def test_a_higher_threshold_is_never_sooner(pair: Pair) -> None:
-    """A curve reaches 0.25 no later than 0.75."""
-    curves, _ = pair
-    assert np.all(steps_to_reach(curves, 0.25) <= steps_to_reach(curves, 0.75))
+    assert np.all(steps <= steps_to_reach(counted, threshold + 0.5))
 
 
 @law

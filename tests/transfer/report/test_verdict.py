@@ -272,11 +272,6 @@ def test_undefined_measures_have_a_reason() -> None:
     assert rows["Area ratio"].target == rows["Area ratio"].total == "undefined"
     assert rows["Area ratio"].method == "none"
     assert rows["Area ratio"].note.startswith("Undefined: it needs a learning curve")
-    flat = rising(-50.0, -50.0, 1e3)
-    not_learnt = make_study(scratch=flat, fine_tune=flat, zero_shot=flat[:, :1])
-    rows = by_name(not_learnt, "fine-tune")
-    assert rows["Jumpstart"].unit == "value"
-    assert "no score exists" in rows["Time to threshold 0.5: steps saved"].note
 
 
 def test_notes_name_their_way_of_counting() -> None:
@@ -301,6 +296,9 @@ def test_arms_by_hand(lines: Study) -> None:
     assert rows["fine-tune"].good == "2 of 2"
     assert rows["source"].good == ""
     assert scratch.terms == {}
+    low = rising(-900.0, -900.0, 1e3)
+    nobody = make_study(scratch=low, fine_tune=low, zero_shot=low[:, :1])
+    assert {row.good for row in arm_rows(nobody)} == {""}
 
 
 def test_the_source_ends_with_its_last_evaluation(study: Study) -> None:
@@ -309,9 +307,3 @@ def test_the_source_ends_with_its_last_evaluation(study: Study) -> None:
     assert [float(text) for text in row.per_seed.split("; ")] == pytest.approx(
         study.source_return, abs=0.1
     )
-
-
-def test_no_run_is_good_where_none_learned() -> None:
-    low = rising(-900.0, -900.0, 1e3)
-    study = make_study(scratch=low, fine_tune=low, zero_shot=low[:, :1])
-    assert {row.good for row in arm_rows(study)} == {""}
