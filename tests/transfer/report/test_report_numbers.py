@@ -74,9 +74,7 @@ def test_t_interval_by_hand() -> None:
     np.testing.assert_allclose(spread.high - spread.mean, [2.48414, 0.0], atol=1e-5)
     np.testing.assert_allclose(spread.mean - spread.low, [2.48414, 0.0], atol=1e-5)
     assert spread_text(np.array([1.0, 2.0, 3.0])) == "2.0 [-0.5, 4.5]"
-
-
-def test_one_run_has_no_interval() -> None:
+    # One run has no interval.
     spread = t_interval(np.array([[1.0, 2.0]]))
     np.testing.assert_array_equal(spread.low, [1.0, 2.0])
     np.testing.assert_array_equal(spread.high, [1.0, 2.0])

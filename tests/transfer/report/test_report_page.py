@@ -215,15 +215,16 @@ def test_pictures_are_embedded(study: Study) -> None:
     assert "To one scale." in read.words
 
 
-ANTS = [EnvRef(f"shapechanger/{name}-v1") for name in ("Ant", "BigAnt", "ExtendedAnt")]
+NAMES = ("InvertedPendulum", "BigInvertedPendulum", "SmallInvertedPendulum")
+POLES = [EnvRef(f"shapechanger/{name}-v1") for name in NAMES]
 
 
 @pytest.fixture(scope="module")
 def pairs() -> Mapping[str, Study]:
-    """Six pairs of three ants; transfer hurts from BigAnt to Ant and helps elsewhere."""
+    """Six pairs of three poles; transfer hurts from the second to the first only."""
     studies: dict[str, Study] = {}
-    for source, target in permutations(ANTS, 2):
-        hurts = (source, target) == (ANTS[1], ANTS[0])
+    for source, target in permutations(POLES, 2):
+        hurts = (source, target) == (POLES[1], POLES[0])
         more = {"fine_tune": rising(-200.0, 100.0, 3000.0, seed=3)} if hurts else {}
         study = make_study(source=source, target=target, **more)
         studies[f"{source.id[13:-3]}-to-{target.id[13:-3]}"] = study
@@ -233,20 +234,20 @@ def pairs() -> Mapping[str, Study]:
 @pytest.fixture(scope="module")
 def suite_page(pairs: Mapping[str, Study]) -> str:
     """The page of all six pairs."""
-    return suite_html("ants", pairs, seeds=5)
+    return suite_html("poles", pairs, seeds=5)
 
 
 def test_pairs_and_methods_have_tables(suite_page: str) -> None:
     """Each cell of the matrix, source by target, links to a report; methods have intervals."""
     reader = Reader(suite_page)
     links = [value for name, value in reader.attributes if name == "href"]
-    for source, target in permutations(("Ant", "BigAnt", "ExtendedAnt"), 2):
+    for source, target in permutations(NAMES, 2):
         assert links.count(f"{source}-to-{target}/report.html") == 2
     assert reader.headings[1] == "Fine-tune against scratch"
     for words, times in (("same body", 3), ("all targets", 3), ("baseline", 4)):
         assert reader.words.count(words) == times
     assert "ahead of scratch in 5, behind in 1, and without a clear difference in 0" in reader.words
-    assert "ExtendedAnt fine-tune 10" in reader.words
+    assert "SmallInvertedPendulum fine-tune 10" in reader.words
     assert "all targets fine-tune 30" in reader.words
 
 
@@ -291,9 +292,9 @@ def test_a_sweep_has_a_chart() -> None:
 
 
 def test_strips_are_embedded_and_films_linked(pairs: Mapping[str, Study], suite_page: str) -> None:
-    strips = {"Ant-to-BigAnt": [FilmStrip("zero-shot: 0.1 m/s", b"\xff\xd8jpeg")]}
-    films = {"Ant-to-BigAnt": "a/film.mp4"}
-    reader = Reader(suite_html("ants", pairs, seeds=5, strips=strips, films=films))
+    strips = {f"{NAMES[0]}-to-{NAMES[1]}": [FilmStrip("zero-shot: 0.1 m/s", b"\xff\xd8jpeg")]}
+    films = dict.fromkeys(strips, "a/film.mp4")
+    reader = Reader(suite_html("poles", pairs, seeds=5, strips=strips, films=films))
     assert ("href", "a/film.mp4") in reader.attributes
     assert any(value.startswith("data:image/jpeg") for _, value in reader.attributes)
     assert "zero-shot: 0.1 m/s" in reader.words
@@ -392,21 +393,17 @@ SHOWN = r"""
   return [lefts, broken];
 }
 """
-POLES = [EnvRef(f"shapechanger/{size}InvertedPendulum-v1") for size in ("", "Big", "Small")]
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("name", ["study", "suite"])
-def test_pages_are_whole_on_a_phone(chromium: Browser, name: str, study: Study) -> None:
+@pytest.mark.parametrize("name", ["page", "suite_page"])
+def test_pages_are_whole_on_a_phone(
+    chromium: Browser, name: str, request: pytest.FixtureRequest
+) -> None:
     """At 390 pixels values are right of their labels, and no word is broken."""
-    page = study_html(study)
-    if name == "suite":
-        pairs = enumerate(permutations(POLES, 2))
-        studies = {f"{i}": make_study(source=one, target=other) for i, (one, other) in pairs}
-        page = suite_html("Three poles", studies, seeds=5)
     shown = chromium.new_page(viewport={"width": 390, "height": 844})
     try:
-        shown.set_content(page)
+        shown.set_content(request.getfixturevalue(name))
         assert shown.evaluate("document.documentElement.scrollWidth") == 390
         lefts, broken = shown.evaluate(SHOWN)
     finally:

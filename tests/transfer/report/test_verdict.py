@@ -37,18 +37,12 @@ SLOPE = STEPS / STEPS[-1]
 
 
 @pytest.mark.parametrize(
-    ("estimate", "expected"),
-    [
-        (Estimate(0.3, 0.1, 0.5), "up"),
-        (Estimate(-0.3, -0.5, -0.1), "down"),
-        (Estimate(0.3, -0.1, 0.5), "unclear"),
-        (Estimate(0.3, 0.0, 0.5), "unclear"),
-        (Estimate(0.3), "unclear"),
-        (Estimate(None), "unclear"),
-    ],
+    ("expected", "ends"),
+    [("up", (0.1, 0.5)), ("down", (-0.5, -0.1)), ("unclear", (-0.1, 0.5)), ("unclear", (0.0, 0.5))],
 )
-def test_direction_follows_the_interval(estimate: Estimate, expected: Direction) -> None:
-    assert direction(estimate) == expected
+def test_direction_follows_the_interval(expected: Direction, ends: tuple[float, float]) -> None:
+    assert direction(Estimate(0.3, *ends)) == expected
+    assert direction(Estimate(0.3)) == direction(Estimate(None)) == "unclear"
 
 
 @pytest.mark.parametrize(
@@ -75,7 +69,6 @@ def test_direction_follows_the_interval(estimate: Estimate, expected: Direction)
             "Neither scratch nor fine-tune learned in 10,240 target steps: scratch's return went ",
         ),
     ],
-    ids=["helped", "hurt", "unclear", "zero-shot", "flat", "a third arm"],
 )
 def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
     text = verdict(study)
@@ -94,21 +87,16 @@ def test_the_other_arms_have_sentences() -> None:
         "(400) stayed behind scratch; randomised (1,550) came out ahead of scratch; scratch went "
         "from 1.23 to 881 in training."
     )
-
-
-def test_seeds_without_spread_are_not_called_unclear() -> None:
-    """If there is no interval because all seeds are equal, the verdict says so."""
+    # If there is no interval because all seeds are equal, the verdict says so.
     solved = {"scratch": np.tile(1000.0 * SLOPE, (5, 1)), "zero_shot": np.full((5, 1), 1000.0)}
     words = "cannot be judged without an interval"
-    assert other_arms(make_study(**solved)).startswith(
-        f"Without training, zero-shot (1,000) {words};"
-    )
+    assert f"zero-shot (1,000) {words};" in other_arms(make_study(**solved))
     alone = make_study(**solved, arms=("scratch", "zero-shot"))
     assert verdict(alone).startswith(f"Zero-shot {words}: zero-shot's return was 1,000 without ")
 
 
 WAY_ON = "again with --seeds 5, and it keeps these runs and adds the others."
-JUDGED = re.compile("helped|hurt|difference|differ|ahead|behind")
+JUDGED = re.compile("helped|hurt|differ|ahead|behind")
 values = st.floats(-2000.0, 2000.0)
 
 
@@ -272,9 +260,7 @@ def test_undefined_measures_have_a_reason() -> None:
     assert rows["Area ratio"].target == rows["Area ratio"].total == "undefined"
     assert rows["Area ratio"].method == "none"
     assert rows["Area ratio"].note.startswith("Undefined: it needs a learning curve")
-
-
-def test_notes_name_their_way_of_counting() -> None:
+    # Notes name their way of counting.
     row = by_name(make_study(source_steps=10_240), "fine-tune")["Area ratio"]
     assert row.total == "0 (no interval)"
     assert row.method.endswith("/ none")
