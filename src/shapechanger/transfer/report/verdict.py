@@ -244,7 +244,6 @@ def _good(study: Study, kind: str) -> str:
 
 
 Direction = Literal["up", "down", "unclear"]
-
 Outcome = Literal["up", "down", "unclear", "no interval", "unlearned", "too few"]
 
 # Verbs for an arm that is trained on the target, and for another arm.
@@ -334,11 +333,8 @@ def finding(study: Study) -> str:
         who = f"Neither scratch nor {arm}" if others else "No arm"
         return f"{who} learned in {budget}: scratch's {plan.measure} {scratch}, and {arm}'s {ours}."
     if _is_trained(study, arm):
-        head, words = (
-            f"Transfer {_VERBS[found][0]}",
-            f"over {budget} {arm}'s {plan.measure} averaged ",
-        )
-        words += f"{_height(study, arm)} and scratch's {_height(study, 'scratch')}."
+        head, words = f"Transfer {_VERBS[found][0]}", f"over {budget} {arm}'s {plan.measure}"
+        words += f" averaged {_height(study, arm)} and scratch's {_height(study, 'scratch')}."
     else:
         head = f"{arm.capitalize()} {_VERBS[found][1]}"
         words = f"{arm}'s {plan.measure} {ours}, and scratch's {scratch} in {budget}."
@@ -355,10 +351,10 @@ def other_arms(study: Study) -> str:
         return ""
     parts: tuple[dict[str, list[str]], ...] = ({}, {})
     for arm in study.summaries:
-        untrained = not _is_trained(study, arm)
         if arm != study.headline_arm:
-            verb = _VERBS[outcome(study, arm)][untrained]
-            parts[untrained].setdefault(verb, []).append(f"{arm} ({_height(study, arm)})")
+            side = 0 if _is_trained(study, arm) else 1
+            verb = _VERBS[outcome(study, arm)][side]
+            parts[side].setdefault(verb, []).append(f"{arm} ({_height(study, arm)})")
     trained, untrained = (
         "; ".join(f"{' and '.join(arms)} {verb}" for verb, arms in part.items()) for part in parts
     )
