@@ -148,7 +148,6 @@ def test_names_are_escaped() -> None:
         (make_study(shift=""), "The envs publish no certificate"),
         (make_study(command=""), "called from Python"),
     ],
-    ids=["given policy", "zero-shot", "not learnt", "two seeds", "huge", "no shift", "no command"],
 )
 def test_missing_parts_are_stated(study: Study, words: str) -> None:
     """The page states what is missing, and never shows nan, inf or None."""
@@ -280,13 +279,10 @@ def test_declared_seeds_and_earlier_looks_are_stated(
     assert unsaid not in suite_page
 
 
-def test_a_sweep_has_a_chart() -> None:
-    studies = {
-        f"Ant-{factor:g}": make_study(target=EnvRef("shapechanger/Ant-v1", {"body": str(factor)}))
-        for factor in (0.5, 1.5, 2.0)
-    }
-    values = {name: float(name[4:]) for name in studies}
-    reader = Reader(suite_html("shank", studies, seeds=5, sweep=Sweep("factor", values)))
+def test_a_sweep_has_a_chart(study: Study) -> None:
+    values = {"a": 0.5, "b": 1.5, "c": 2.0}
+    sweep = Sweep("factor", values)
+    reader = Reader(suite_html("shank", dict.fromkeys(values, study), seeds=5, sweep=sweep))
     assert "Over the targets" in reader.headings
     assert "Fine-tune against scratch" not in reader.headings
 
