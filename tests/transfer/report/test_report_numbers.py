@@ -11,59 +11,40 @@ from shapechanger.transfer.report.verdict import estimate_text
 
 
 @pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.0, "0"),
-        (-0.0, "0"),
-        (3.0, "3"),
-        (0.12345, "0.1235"),
-        (-880.61, "-880.6"),
-        (1234567.0, "1,234,567"),
-        (-1.5e12, "-1.500e12"),
-        (1e-9, "0.000000"),
-    ],
-)
-def test_numbers_are_short(value: float, text: str) -> None:
-    """Decimals end at four significant digits, or six decimals; huge numbers have exponents."""
-    assert number(value) == text
-
-
-@pytest.mark.parametrize(
-    ("low", "value", "high", "text"),
-    [
-        (0.22, 0.31, 0.40, "0.31 [0.22, 0.40]"),
-        (-0.1234, 0.01, 0.1434, "0.01 [-0.12, 0.14]"),
-        (859.1, 880.6, 902.2, "881 [859, 902]"),
-        (0.004, 0.5, 1.0, "0.500 [0.004, 1.000]"),
-        (1e-9, 0.5, 1.0, "0.500000 [0.000000, 1.000000]"),
-        (5.0, 5.0, 5.0, "5 [5, 5]"),
-        (-2e12, 1e12, 4e12, "1.000e12 [-2.000e12, 4.000e12]"),
-    ],
-)
-def test_intervals_have_two_significant_digits(
-    low: float, value: float, high: float, text: str
-) -> None:
-    """Decimals depend on the width; up to six keep an end other than zero from looking like 0."""
-    assert interval_text(value, low, high) == text
-
-
-@pytest.mark.parametrize(
     ("text", "words"),
     [
+        # Decimals end at four significant digits, or six decimals; huge numbers have exponents.
+        (number(0.0), "0"),
+        (number(-0.0), "0"),
+        (number(3.0), "3"),
+        (number(0.12345), "0.1235"),
+        (number(-880.61), "-880.6"),
+        (number(1234567.0), "1,234,567"),
+        (number(-1.5e12), "-1.500e12"),
+        (number(1e-9), "0.000000"),
+        # The rounded number decides about the sign.
         (number(0.25, 2, signed=True), "+0.25"),
         (number(0.001, 2, signed=True), "0.00"),
         (number(-0.001, 2, signed=True), "0.00"),
         (number(2e11, signed=True), "+2.000e11"),
+        # The width of an interval decides about decimals; up to six keep its ends other than 0.
+        (interval_text(0.31, 0.22, 0.40), "0.31 [0.22, 0.40]"),
+        (interval_text(0.01, -0.1234, 0.1434), "0.01 [-0.12, 0.14]"),
+        (interval_text(880.6, 859.1, 902.2), "881 [859, 902]"),
+        (interval_text(0.5, 0.004, 1.0), "0.500 [0.004, 1.000]"),
+        (interval_text(0.5, 1e-9, 1.0), "0.500000 [0.000000, 1.000000]"),
+        (interval_text(5.0, 5.0, 5.0), "5 [5, 5]"),
+        (interval_text(1e12, -2e12, 4e12), "1.000e12 [-2.000e12, 4.000e12]"),
         (estimate_text(undefined("Why not.")), "undefined"),
         (estimate_text(Estimate(0.5), signed=True), "+0.5000 (no interval)"),
         (estimate_text(Estimate(0.3, 0.2, 0.4), signed=True), "+0.30 [+0.20, +0.40]"),
+        # Numbers of a list share their digits.
         (list_text([5.0, 7.5, 15.0]), "5.0; 7.5; 15.0"),
         (list_text([1000.0, 1000.0]), "1,000; 1,000"),
         (spread_text(np.array([950.0])), "950 (no interval)"),
     ],
 )
-def test_signs_and_lists_by_hand(text: str, words: str) -> None:
-    """The rounded number decides about the sign; numbers of a list share their digits."""
+def test_numbers_by_hand(text: str, words: str) -> None:
     assert text == words
 
 

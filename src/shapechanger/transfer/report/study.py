@@ -268,12 +268,9 @@ def _body_map(ours: BodyMap) -> dict[str, Any]:
 
 def _unused(ours: BodyMap) -> list[str]:
     """Return sentences that list target observations and source actions that no rule copies."""
+    unseen = "Target observations that the source policy does not see"
     sides = (
-        (
-            "Target observations that the source policy does not see",
-            ours.observation,
-            ours.target_observation,
-        ),
+        (unseen, ours.observation, ours.target_observation),
         ("Source actions that move nothing in the target", ours.action, ours.source_action),
     )
     sentences: list[str] = []
