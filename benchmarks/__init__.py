@@ -1,1 +1,1 @@
-"""Benchmarks of every number that Shapechanger states."""
+"""Benchmarks that measure the numbers in the documentation."""

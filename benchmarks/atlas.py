@@ -1,8 +1,8 @@
 """Transfer between bodies: suites of studies with intervals.
 
 The studies take hours and resume from `results/`. `SEEDS` sets the number of runs per arm, and
-`ONLY` names the studies to run, separated by spaces. The values of every run and the images of
-the README are written next to the rows.
+`ONLY` names the studies to run, separated by spaces. The values of every run are
+written to `benchmarks/results/`, next to the rows, and images to `docs/pictures/`.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ def pages() -> list[Row]:
 
 
 def _first_reaching(run: RunResult, level: float) -> float | None:
-    """Return the seconds until an evaluation of a run reaches `level`; None if none does."""
+    """Estimate the seconds until an evaluation of a run reaches `level`; None if none does."""
     for evaluation in run.curve:
         if evaluation.mean_return >= level:
             return run.wall_s * evaluation.steps / run.curve[-1].steps
@@ -223,7 +223,7 @@ def _power_shares(study: Study, folder: Path) -> NDArray[np.float64]:
 
 
 def _suite(name: str) -> dict[str, Study]:
-    """Run the missing studies of a suite and write the values of its runs."""
+    """Run the missing studies of a suite, write the values of its runs, and return its studies."""
     suite, out = load_suite(name), Path("results", name)
     seeds = int(os.environ.get("SEEDS", suite.seeds))
     SuiteRun(name=name, seeds=seeds, out=out, only=tuple(os.environ.get("ONLY", "").split())).run()

@@ -36,7 +36,7 @@ def timed_row(name: str, work: Callable[[], object], limit_ms: float) -> Row:
 
 
 def bodies() -> list[Row]:
-    """Time edits and compilation."""
+    """Time edits, compilation and a fingerprint."""
     ant_xml = expand_model_path("ant.xml")
     spec = ANT.load(ant_xml)
     rows = [

@@ -179,7 +179,7 @@ def _tensor(pictures: NDArray[np.uint8]) -> torch.Tensor:
 
 
 def real() -> list[Row]:
-    """Compare both methods on all splits and seeds."""
+    """Compare our clone with the plain network, and test clones from simulation."""
     frames = os.environ.get("REAL_FRAMES")
     if frames is None:
         return [Row("real frames", "skipped", "REAL_FRAMES names no folder", "none", True)]
@@ -192,7 +192,7 @@ def real() -> list[Row]:
 def scores(
     data: Dataset, seeds: int = SEEDS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Return accuracy, macro-F1 and seconds of both methods, each of shape (splits, seeds, 3)."""
+    """Return the `Scores` of both methods, each (splits, seeds, 3), and the share of class 0."""
     classes = output_fields(data.actions, data.action_layout, "class")["classes"]
     truth = class_numbers(data.actions, classes)
     pictures = prepare(_pictures(data), DEMOS.framing)
@@ -211,7 +211,7 @@ def scores(
             policy, _ = learn(data.part(learned), head="class", seed=seed)
             done = class_numbers(policy.predict_many(pictures[future]), classes)
             ours[i, seed] = _scored(done, truth[future], began)
-    # Accuracy of always predicting the most frequent key, on the test segments.
+    # Classes are sorted by frequency, so class 0 is the most frequent key.
     judged = np.concatenate([truth[future] for _, future in splits])
     return ours, theirs, float((judged == 0).mean())
 
@@ -320,7 +320,7 @@ def held_out() -> list[Row]:
 
 
 def _from_simulation(data: Dataset) -> list[Row]:
-    """Test clones of the simulated expert on the real frames."""
+    """Test clones of the simulated expert on real frames, before and after training on a few."""
     pictures = _pictures(data)
     fields = output_fields(data.actions, data.action_layout, "class")
     truth, names = class_numbers(data.actions, fields["classes"]), fields["class_names"]

@@ -1,4 +1,4 @@
-"""Age of the console's images on its canvas, and its effect on the robot's control loop.
+"""Age of the console's images on its canvas, and the console's effect on the robot's control loop.
 
 The camera of the twin draws the capture time into the first rows of each image. A script in the
 page reads it back from the canvas at each animation frame. The page's clock is compared with the
@@ -167,7 +167,7 @@ def _ages_ms(browser: Browser, robot: RunningRobot, seconds: float) -> tuple[lis
         page.wait_for_timeout(1e3 * seconds)
         seen: list[tuple[int, float, str]] = page.evaluate("globalThis.seen")
     if len(seen) < 10.0 * seconds:
-        # The robot restarted, because the machine was too busy for its guard.
+        # Probably the robot restarted, because the machine was too busy for its guard.
         raise RuntimeError(f"Only {len(seen)} pictures came in {seconds:.0f} s: {robot.log_text()}")
     ages: list[float] = []
     for number, at_ms, bits in seen[1:]:

@@ -1,8 +1,8 @@
 """Value of one round of corrections: record, train, drive, correct, train again.
 
-All steps run the commands that a user would type, in `results/corrections`; finished steps are not
-repeated. After ten minutes of the expert there is little to correct, so another round starts from
-two minutes and is compared with recording more of the expert instead of corrections.
+All steps but the driving run the commands that a user would type, in `results/corrections`;
+finished steps are not repeated. After ten minutes of the expert there is little to correct, so
+another round starts from two minutes and is compared with two more minutes of the expert.
 """
 
 from __future__ import annotations

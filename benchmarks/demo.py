@@ -19,7 +19,7 @@ from benchmarks.row import Row
 
 
 def demo() -> list[Row]:
-    """Run the demo as a user does."""
+    """Run the command of `make demo`, in another folder."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "demo"
         command = ["shapechanger", "transfer", "InvertedPendulum", "InvertedPendulum"]

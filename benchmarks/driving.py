@@ -109,7 +109,7 @@ class DriveScore:
         slowest: Mean speed of the slowest drive, m/s.
         fastest: Mean speed of the fastest drive, m/s.
         collisions: Total number of collisions.
-        per_100_m: Collisions per 100 m of net progress; infinite without any progress.
+        per_100_m: Collisions per 100 m of net progress; infinite if it collided without progress.
         low: Lower bound of the collisions per 100 m, with 95 % confidence.
         high: Upper bound of the collisions per 100 m, with 95 % confidence.
         reached: Share of drives that reached the required distance.

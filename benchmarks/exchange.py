@@ -20,7 +20,7 @@ _MB = 1e6
 
 
 def video() -> list[Row]:
-    """Export a minute of the expert's drive in each world, import it, and compare the images."""
+    """Export a minute of each vehicle's expert drive, import it, and compare the images."""
     return [_row(vehicle) for vehicle in asked("vehicle", _VEHICLES)]
 
 

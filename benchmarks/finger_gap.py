@@ -57,7 +57,7 @@ _RECOVERED_IN_GAP: Final = 0.9
 _TUNED: Final = 0.7
 # A mean over fingers hides weak ones, so each row also counts the fingers with at least this share.
 _STRONG: Final = 0.8
-_FOLLOWED: Final = 2.0  # Largest error on a rig's twin, in errors in process.
+_FOLLOWED: Final = 2.0  # Largest error on a rig's twin, as a multiple of the error in process.
 # Time that the whole command may take for a finger, min.
 _LIMIT_MIN: Final = 30.0
 # Distance within which a target counts as reached, m; `Finger-v1` has the same.
@@ -158,7 +158,7 @@ def _shipped_row(where: str, env: EnvRef) -> Row:
 
 
 def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
-    """Return how many targets each finger can hold, and how many of them policies reach."""
+    """Return how many targets each finger can hold, and a controller and policies reach."""
     held, moved_to, controlled = (dict[int, NDArray[np.bool_]]() for _ in range(3))
     fingers = {seed: plan.task.target.having({"finger_seed": seed}) for seed in range(plan.seeds)}
     first = {seed: evaluation_seed(finger, TARGETS) for seed, finger in fingers.items()}
@@ -347,7 +347,6 @@ def _plan(
     policy: Shipped = "reach",
     source_steps: int | None = None,
 ) -> Plan:
-    """Plan a study of a shipped policy."""
     return make_plan(
         TransferTask(source, target),
         learner,
@@ -361,7 +360,6 @@ def _plan(
 
 
 def _run(plan: Plan, out: Path, *, policy: Shipped = "reach") -> None:
-    """Run a study and write its report."""
     study = run_study(
         plan,
         out,
@@ -385,7 +383,7 @@ def _ended(plan: Plan, out: Path) -> dict[str, list[RunResult]]:
 def rows_of(
     runs: Mapping[str, list[RunResult]], where: str, least: Mapping[str, float], simulated: int
 ) -> list[Row]:
-    """Return rows of the final success of each arm; in the nominal finger it would be 100 %.
+    """Return one row for each arm, with its final success.
 
     Args:
         runs: The runs, keyed by arm.

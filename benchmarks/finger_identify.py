@@ -1,4 +1,4 @@
-"""Accuracy of moment arms identified from ten seconds of noisy babble."""
+"""Accuracy and duration of identifying a finger from ten seconds of noisy babble."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _off(found: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _factors(found: IdentifiedFinger, truth: FingerParameters) -> dict[str, float]:
-    """Return the ratio of identified to true value for the other parameters."""
+    """Return the ratios of identified to true values of parameters other than the arms."""
     mine = found.parameters
     over = {
         f"{name} of {joint}": getattr(mine, name)[j] / getattr(truth, name)[j]

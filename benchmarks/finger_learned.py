@@ -59,7 +59,7 @@ TASKS: Final = {
     "reach": Task(EnvRef("shapechanger/Finger-v1"), "ppo-finger", 307_200),
     # Trained on random paths, so that the policy generalises to others.
     "track": Task(EnvRef("shapechanger/FingerTrack-v1", {"path": "random"}), "ppo-finger", 307_200),
-    # Trained with a rig's motors, delay and noise, but only in the nominal finger.
+    # Trained in the gap of a rig, but with the nominal finger's moment arms and joints.
     "rig": Task(
         EnvRef(
             "shapechanger/Finger-v1",
@@ -79,7 +79,7 @@ TASKS: Final = {
 
 
 def learned() -> list[Row]:
-    """Train the missing policies and evaluate them on unseen targets."""
+    """Train the missing policies, and evaluate them on unseen targets and on a circle."""
     seeds = range(int(os.environ.get("SEEDS", SEEDS)))
     wanted = [(name, seed) for name in ("reach", "track") for seed in seeds]
     FOLDER.mkdir(parents=True, exist_ok=True)

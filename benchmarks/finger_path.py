@@ -115,7 +115,7 @@ def _played(env: gym.Env[Any, Any], seed: int) -> FingerLog:
 
 
 def _replayed(log: FingerLog, finger: FingerParameters) -> NDArray[np.float64]:
-    """Return the angles of a finger under the commands of a log, rad, (n, 4)."""
+    """Return the angles of a finger under the commands of a log from `_BEGINS` on, rad, (n, 4)."""
     speeds = np.gradient(log.angles, CONTROL_DT, axis=0)
     window = Window(
         start=float(log.t[_BEGINS]),

@@ -1,8 +1,8 @@
 """Finger env in a separate process, stepped on demand: `finger_peer.py KIND`.
 
 KIND is `ours` or `myosuite`. The process prints `ready`, its version and the duration of a step, s.
-For each number of steps that it reads, it prints the CPU seconds they took, resets included. It
-imports none of our other modules, so that it can run in another Python environment.
+For each number of steps that it reads, it prints the CPU seconds they took, resets included. With
+`myosuite` it does not import Shapechanger, so that it can run in another Python environment.
 """
 
 from __future__ import annotations

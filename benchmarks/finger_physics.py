@@ -26,7 +26,7 @@ _N: Final = len(JOINTS)
 
 
 def physics() -> list[Row]:
-    """Measure the finger under random commands."""
+    """Measure the coupling of the end joint, the stiffness, and the error of the time step."""
     off = np.degrees([_end_off(seed) for seed in range(_COMMANDS)])
     beyond = float(np.mean(off > np.degrees(DIP_BAND)))
     low, high = (_stiffness(level) for level in (1.0, 2.5))
@@ -65,7 +65,7 @@ def physics() -> list[Row]:
 
 
 def _end_off(seed: int) -> float:
-    """Return the deviation of the end joint from `DIP_BY_PIP` times the middle joint, rad."""
+    """Return how far the end joint is from `DIP_BY_PIP` times the middle one, after 2 s, rad."""
     model = build_finger(NOMINAL, drive_of("impedance", NOMINAL)).compile()
     data = mujoco.MjData(model)
     data.qpos[:] = JOINT_REST

@@ -1,6 +1,6 @@
 """Simulated seconds of a finger per core-second, compared with MyoSuite's finger.
 
-Rounds are paired in alternating order; each gives one ratio.
+Each round measures both, in alternating order, and gives one ratio.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Send mutated messages to a robot: no crash, no accepted command, constant memory.
 
-`python -m benchmarks.fuzz_link --count 1000000` mutates messages of every kind (flipped bits, cuts,
+`python -m benchmarks.fuzz_link --count 1000000` mutates messages of many kinds (flipped bits, cuts,
 splices, wrong lengths, deep nesting, huge numbers) and passes them to a session of the daemon, as
 its WebSocket would. Another client controls the robot, so the robot accepts commands. The fuzzing
 client may only send an emergency stop. `tests/robot/daemon/test_fuzz.py` sends a few thousand.
@@ -154,11 +154,12 @@ def fuzz(
     """Send mutated messages to unauthenticated sessions and to sessions without the lease.
 
     Returns:
-        Number of messages that ended the connection, of decoded messages, and of orders of each
-        kind that reached the guard.
+        Number of strangers that were refused, of messages that ended the connection, of decoded
+        messages, and of orders of each kind that were given to the guard.
 
     Raises:
-        AssertionError: If a command was accepted, or a session authenticated.
+        AssertionError: If a command, halt or arming came through, a stranger was let in, or the
+            owner lost control.
     """
     rng = random.Random(seed)
     counts: collections.Counter[str] = collections.Counter()

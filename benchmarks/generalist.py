@@ -90,7 +90,7 @@ def generalist() -> list[Row]:
 
 
 def rows_of(found: list[Scores]) -> list[Row]:
-    """Return the speeds of both networks in each split, and how often limbs are ahead."""
+    """Return the speeds of both networks in each split and the extended ant, and who is ahead."""
     rows: list[Row] = []
     by_network = {
         network: [one for one in found if one.network == network] for network in ("limbs", "padded")
@@ -137,7 +137,7 @@ def _speed(speeds: _Floats) -> str:
 def _improvement(one: _Floats, other: _Floats) -> tuple[float, float, float]:
     """Return the probability that a policy of `one` is faster than a policy of `other` in a body.
 
-    Policies are evaluated in all bodies, so the bootstrap draws policies and bodies, not pairs.
+    Policies are evaluated in all bodies, so the bootstrap draws policies and bodies independently.
 
     Args:
         one: Speeds, shape (seeds, bodies).
@@ -238,7 +238,6 @@ def against_specialists() -> list[Row]:
 
 
 def _settings(network: str) -> LimbSettings:
-    """Return the shipped settings of a network."""
     return cast("LimbSettings", learner_settings(network))
 
 
@@ -282,7 +281,7 @@ def _scratch(split: str) -> list[float]:
 
 
 def _scratch_row(found: list[Scores], split: str, alone: list[float]) -> Row:
-    """Compare policies that learn in one body, with that body's share of steps, with zero-shot."""
+    """Compare zero-shot with policies that learned in the body itself, for `SHARE` steps."""
     limbs = np.array(
         [one.splits[split][:SCRATCH_BODIES] for one in found if one.network == "limbs"]
     )

@@ -8,7 +8,7 @@ and runs the trial there.
 `python -m benchmarks.run gpu-generalist` trains one policy in many bodies on a GPU and keeps it in
 `benchmarks/results`, and `python -m benchmarks.run generalist-gpu` evaluates it on a CPU.
 
-    LIMIT: Seconds for that training, which is shortened to as many steps as fit.
+    LIMIT: Seconds for `gpu-generalist`, whose training is shortened to as many steps as fit.
     GPU_REFERENCE: A file of `python -m benchmarks.gpu FILE`, written on a machine on which Warp
         compiles for CPUs; without it the CPU device of this machine is the reference.
 """
@@ -126,7 +126,7 @@ def _wait() -> None:
 
 
 def made(name: str, count: int, device: str = DEVICE, **arguments: Any) -> Any:
-    """Return worlds after a reset."""
+    """Return a vector env of `count` worlds after a reset."""
     envs = shapechanger.make_vec(name, count, backend="warp", device=device, **arguments)
     envs.reset(seed=0)
     return envs
@@ -150,7 +150,7 @@ def _seconds(work: Callable[[], object], repeats: int) -> float:
 
 
 def _ratio(one: Callable[[], object], other: Callable[[], object], repeats: int) -> list[float]:
-    """Return the sorted ratios of the times of `one` and `other`, in alternating rounds."""
+    """Return the sorted ratios of the time of `one` to that of `other`, in alternating order."""
     ratios: list[float] = []
     for i in range(ROUNDS):
         order = (one, other) if i % 2 else (other, one)
@@ -171,7 +171,7 @@ def _stepper(envs: Any, several: list[Any]) -> Callable[[], object]:
 
 
 def rollouts(device: str) -> dict[str, Any]:
-    """Return observations of few steps from equal starts, keyed by task and step."""
+    """Return the observations of a reset and four steps, keyed by task and step."""
     found: dict[str, Any] = {}
     for name in TASKS:
         bodies = {"bodies": ["Ant", [Stretch("shank_*", 1.2)]] * 4} if name == "Ant" else {}

@@ -26,7 +26,7 @@ class Case(NamedTuple):
 
     Attributes:
         data: Distribution of the areas under the learning curves of single seeds.
-        spread: Standard deviation divided by the mean, in percent.
+        spread: Standard deviation, in percent of the mean (of `SCRATCH` if `data` is "headroom").
         n_seeds: Seeds in each of the two arms.
     """
 
@@ -39,7 +39,7 @@ class Measured(NamedTuple):
     """Result of one method over all studies of a case.
 
     Attributes:
-        coverage: Share of intervals that contain the true value; a missing interval counts as one.
+        coverage: Share of intervals that contain the true value; missing intervals are included.
         width: Median width; a missing interval has infinite width.
     """
 
@@ -76,7 +76,7 @@ def draw(case: Case, trials: int, rng: np.random.Generator) -> tuple[Array, Arra
         return rng.lognormal(np.log(mean) - square / 2.0, np.sqrt(square), shape)
 
     def failures(mean: float) -> Array:
-        """Return areas, one in five of which is a tenth of the others."""
+        """Return areas, each of which is a tenth of the mean with a probability of 0.2."""
         failed = rng.random(shape) < 0.2
         return np.where(failed, 0.1 * mean, rng.normal(mean, spread * mean, shape))
 

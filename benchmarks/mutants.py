@@ -105,7 +105,7 @@ def mutants() -> Iterator[Row]:
 
 
 def _judged(path: Path, equivalent: set[tuple[str, str]]) -> Iterator[tuple[str, str, str]]:
-    """Yield function, changed line and status of each mutant of a file that has run."""
+    """Yield function, changed line and status of each mutant of a file."""
     source = ast.parse(path.with_suffix("").read_text(encoding="utf-8"))
     functions = {n.name: n for n in ast.walk(source) if isinstance(n, ast.FunctionDef)}
     for key, code in json.loads(path.read_text())["exit_code_by_key"].items():

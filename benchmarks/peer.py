@@ -26,7 +26,7 @@ class Peer:
         """Wait for the process and return its description, version first.
 
         Raises:
-            RuntimeError: If it does not start, with its last line of output.
+            RuntimeError: If it does not start, with its last line on standard error.
         """
         assert self._process.stdout is not None
         assert self._process.stderr is not None

@@ -20,7 +20,7 @@ def drive_remote(
     metres: float = METRES,
     limit_s: float = LIMIT_S,
 ) -> DriveResult:
-    """Drive a served twin, as `benchmarks.driving.drive` does an env.
+    """Drive a served twin along a course, like `benchmarks.driving.drive`.
 
     Args:
         env: The robot, made with `on_reset=operator.place`; a collision must not end the episode.

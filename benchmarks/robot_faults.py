@@ -66,7 +66,7 @@ def _hyphened(name: str) -> str:
 def _tried(
     profile: Path, name: str, one_shot: bool, trials: int, folder: Path
 ) -> list[TrialResult]:
-    """Run trials until the robot drove in enough of them, and return all trials."""
+    """Run trials until the robot drove in `trials` of them, at most twice as many; return all."""
     fault = FAULTS[name]
     path = folder / f"{fault.name}{'' if one_shot else ', no one-shot'}.jsonl".replace(" ", "-")
     lines = path.read_text().splitlines() if path.exists() else []

@@ -1,7 +1,7 @@
 """Run benchmarks and print their results next to their targets.
 
-`make bench` prints a table and writes `benchmarks/results/*.json` with the machine's facts. Times
-are the median of several rounds, with their spread; compare ratios, not milliseconds, between
+`make bench` prints a table and writes `benchmarks/results/*.json` with the machine's facts. Most
+times are medians of several rounds, with their spread; compare ratios, not milliseconds, between
 machines. Rows that `ONLY` leaves out stay as they were.
 """
 
@@ -102,7 +102,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
 
 
 def _asked() -> str:
-    """Return the environment variables that were set, as shell assignments."""
+    """Return the listed environment variables that are set, as shell assignments."""
     names = (
         "TRIALS",
         "FINGERS",
@@ -128,7 +128,7 @@ def _processor() -> str:
 
 
 def _former(suite: str) -> dict[str, Any] | None:
-    """Return the former result of a suite, if `ONLY` leaves some of its rows as they were."""
+    """Return the former result of a suite if `ONLY` is set, so that rows it leaves out are kept."""
     path = RESULTS / f"{suite}.json"
     return json.loads(path.read_text()) if "ONLY" in os.environ and path.exists() else None
 
@@ -149,7 +149,7 @@ def _write(suite: str, rows: list[Row], former: dict[str, Any] | None) -> None:
 
 
 def kept(former: dict[str, Any], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the rows of a former result, replaced by new ones of the same name.
+    """Return the former rows, replaced by new ones of the same name, and all other new ones.
 
     A row that is kept from a former run has its command as `measured_by`.
 

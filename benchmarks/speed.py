@@ -1,7 +1,7 @@
 """Speed of steps and frames of one env, compared with Gymnasium's.
 
 Rounds are paired: in each, both envs take the same actions from the same state, in alternating
-order, and give one ratio of CPU times. Resets are not included.
+order, and give one ratio of CPU times. Resets are timed apart from steps.
 """
 
 from __future__ import annotations

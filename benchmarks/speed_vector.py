@@ -1,7 +1,7 @@
 """Speed of many ants stepped together, compared with bare physics and other libraries.
 
-Rounds are paired: each runs both sides one after the other, in alternating order, and gives one
-ratio. If the states of both sides can be set, a round starts all envs from the same states.
+Each round runs both sides one after the other, and gives one ratio. If the states of the other side
+can be set, it runs first, from the states of our envs; otherwise the order alternates.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How often a car's teacher stands for good at starts off the lane.
+"""How often a car's teacher, which senses distances, stands for good at starts off the lane.
 
 `SEEDS` teachers are trained with the preset of `CarRanges` and kept in `results/standing`.
 All starts are on held-out courses.
@@ -49,7 +49,7 @@ class Starts(NamedTuple):
 
     Attributes:
         stood: Number of starts after which the vehicle stood for good.
-        stayed: Number of starts after which the vehicle moved less than 0.5 m in the last 4 s.
+        stayed: Number of starts with less than 0.5 m of progress in the last 4 s.
         share: Share of all steps in which the vehicle stood.
         metres: Total progress, m.
         collisions: Number of collisions.

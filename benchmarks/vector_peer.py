@@ -2,8 +2,8 @@
 
 KIND is `ours`, `envpool` or `memory`. The process prints `ready` and its version; for each number
 of steps that it reads, it prints the seconds they took. `memory` prints the resident memory per
-env, in bytes, once. It imports none of our other modules, so that it can run in another Python
-environment.
+env, in bytes, once. With `envpool` it does not import Shapechanger, so that it can run in another
+Python environment.
 """
 
 from __future__ import annotations

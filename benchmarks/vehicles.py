@@ -1,4 +1,4 @@
-"""Speed of the vehicles' envs, and driving of the expert and of the clones.
+"""Speed of the vehicles' envs, and driving of the expert, of clones, and of teachers and students.
 
 All drives are on held-out courses.
 """
@@ -44,17 +44,17 @@ def layouts(usual: int) -> range:
 
 
 def frames() -> list[Row]:
-    """Measure steps per second of each vehicle, with an image each."""
+    """Measure steps per second of each vehicle, with an image in each step."""
     return [_frames_row(vehicle) for vehicle in ("car", *sorted(set(VEHICLES) - {"car"}))]
 
 
 def _frames_row(vehicle: str) -> Row:
-    """Measure the CPU time of all threads, the driver's included and the expert's excluded."""
+    """Measure the CPU time of all threads, with the graphics driver's and without the expert's."""
     rates: list[float] = []
     with gym.make(f"shapechanger/{vehicle.capitalize()}-v1", put_back=True) as env:
         inner: Any = env.unwrapped
         pilot = inner.expert()
-        # Long drives on one course, so that resets do not count.
+        # All rounds are on one course, and resets are not timed.
         seen, _ = env.reset(seed=0, options={"course": HELD_OUT[0], "start": 0})
         spent = _spent_s(env, pilot, seen)  # The first round warms up.
         for _ in range(ROUNDS):

@@ -26,9 +26,9 @@ from shapechanger.vehicles.envs.ranges import COLLISION_REWARD
 
 SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
-# Seconds of the target's driving after which fine-tuning is compared with scratch.
+# Seconds of the target's driving after which the other arms are compared with scratch.
 _SECONDS: Final = (15, 30)
-# Limit of collisions per 100 m, and number of the twelve pairs that should stay below it.
+# Limit of collisions per 100 m, and number of pairs on which minutes should be halved; see `pairs`.
 FEW: Final = 3.0
 GOOD: Final = 8
 _ARMS: Final = ("scratch", "fine-tune", "rehearsal")
@@ -130,7 +130,7 @@ def keep_runs(pairs: Sequence[Path]) -> None:
 
 
 def _seconds_row(pair: Path) -> Row:
-    """Return the target time that each arm needs until it rarely collides."""
+    """Return the target time until each arm collides at most `FEW` times per 100 m."""
     needed: list[str] = []
     rates: list[str] = []
     for arm in _ARMS:

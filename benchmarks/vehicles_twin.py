@@ -40,7 +40,7 @@ _CLEAR_M: Final = 2.5
 
 
 class _Turner:
-    """Driver that turns to one side until the distance ahead is free.
+    """Driver that goes straight, and turns away from a near wall, to alternating sides.
 
     Args:
         layout: Layout of the state.

@@ -82,7 +82,7 @@ SOURCES: Final = {
     "mixed-boat": Source("boat", ("harbour", FLOODED)),
 }
 OWN: Final = tuple(list(SOURCES)[:4])  # Sources that have the name of their vehicle.
-# Sources that are taught in other worlds than their targets.
+# Sources that are taught, at least in part, in other worlds than their targets.
 ACROSS: Final = tuple(list(SOURCES)[4:])
 # Two clones of the same images, whose labels differ.
 BY_STEERING: Final = {
@@ -97,13 +97,13 @@ CAMERAS: Final[dict[str, dict[str, Any]]] = {
 # Shipped clones, which were trained in the corridor, and the vehicles that they drive.
 STEERED: Final = (("car", "tank"), ("tank", "car"))
 STEERED_COURSES: Final = COURSES[:6]
-# Limit of collisions per 100 m, and number of the six pairs that should stay below it.
+# Limit of collisions per 100 m, and number of the six pairs that should not exceed it.
 FEW: Final = 4.0
 GOOD: Final = 4
 
 
 def pairs() -> list[Row]:
-    """Measure the six ordered pairs of land vehicles, all in the corridor."""
+    """Measure each land vehicle's policy in all of them, and steering clones, in the corridor."""
     found = _measure([*permutations(VEHICLES, 2), *((one, one) for one in VEHICLES)])
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         by_steering = dict(zip(STEERED, pool.map(_steered, STEERED), strict=True))
