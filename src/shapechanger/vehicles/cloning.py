@@ -202,9 +202,10 @@ class CloneLearner(Learner[CloningSettings]):
         on_evaluation: Callable[[Evaluation], None] = ignore,
         on_steps: Callable[[int], None] = lambda steps: None,
     ) -> CameraPolicy:
-        """Clone the demonstrator at each budget, or `only_last`, and return the last clone.
+        """Clone the demonstrator at each budget up to `steps`, and return the last clone.
 
-        Each clone begins at the same start, and is evaluated. `rehearsed` is an env, a number of
+        With `only_last`, it is cloned at `steps` only. Each clone begins at the same start; the
+        start and each clone are evaluated. `rehearsed` is an env, a number of
         steps and a file of demonstrations to mix in.
         """
         del body_map

@@ -46,7 +46,7 @@ def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
 def place_of(profile: Profile, world: str = "", lenses: Sequence[str] = ()) -> Place:
     """Return the place of a robot's twin: a course with these camera faults, or the plain room.
 
-    `world` is a kind of course; by default the vehicle's home, or the room for another robot.
+    `world` is a kind of course; by default a vehicle's home, or for any other robot the plain room.
     """
     for lens in lenses:
         find_corruption(lens)

@@ -173,7 +173,7 @@ def command(
     Pure pursuit: the circle through a point at the distance L and the bearing b has the curvature
     2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992). The action, bearing and speed, is clipped
     to -1 to 1. `speed` is the speed along the heading, m/s. `on_the_spot` is for a vehicle with
-    tracks, whose throttle is limited so that neither track saturates.
+    tracks, whose throttle is lowered, down to `LEAST_THROTTLE`, to keep tracks from saturating.
     """
     values = np.asarray(action, np.float64)
     if values.shape != (2,) or not np.isfinite(values).all():
@@ -287,8 +287,8 @@ class WaypointLabels(NamedTuple):
     """Waypoints that a driver's commands lead to."""
 
     actions: NDArray[np.float32]  # Bearing and speed, each from -1 to 1, shape (n, 2).
-    # Whether a command determines a waypoint, shape (n,): False if the vehicle stands still, drives
-    # backward, or did not measure its speed.
+    # Whether a command determines a waypoint, shape (n,): False if the vehicle drives backward,
+    # stands still without a command to drive, or did not measure its speed.
     usable: NDArray[np.bool_]
     # Whether the bearing is only a lower bound, shape (n,): at full steering, or beyond the widest
     # bearing.

@@ -292,8 +292,8 @@ class MujocoWorld:
 
         `reach` is the radius in view around the middle of the vehicle, m, by default its own reach.
         The azimuth is the direction of view from the heading, counter-clockwise; 0 is from behind.
-        Of several directions, the first in which no wall hides the vehicle is used. A negative
-        elevation looks down.
+        Of several directions, the first in which nothing hides the vehicle is used, or else the
+        first. A negative elevation looks down.
         """
         if self._outside is None or self._outside.size != (width, height):
             from shapechanger.vehicles.cameras.camera import OutsideCamera  # OpenGL.

@@ -138,7 +138,8 @@ class Rolling(BoundVehicle):
     def drive(self, outputs: Outputs, battery_v: float) -> None:
         """Set the voltages of the motors and the angles of the front wheels.
 
-        All wheels roll around one point on the line of the rear axle (Ackermann's condition).
+        If it steers, all wheels but a trailer's roll around one point of the rear axle's line
+        (Ackermann's condition).
         """
         super().drive(outputs, battery_v)
         steering = outputs.get("steering", 0.0)

@@ -31,7 +31,7 @@ _BEHIND_ALL_M: Final = 1000.0
 _drawing: set[int] = set()
 # A pixel of an outside view is the mean of a square this many pixels wide, so edges are smooth.
 _SUPERSAMPLED: Final = 2
-_LARGEST: Final = 4096  # Width and height; software renderers draw no larger images.
+_LARGEST: Final = 4096  # Width and height of outside views; software renderers draw no larger.
 
 
 class _Renderer:
@@ -144,7 +144,7 @@ class OutsideCamera(_Renderer):
         azimuth_rad: float,
         elevation_rad: float,
     ) -> NDArray[np.uint8]:
-        """Render a state from a distance to the point in the middle of the image, m, (3,).
+        """Render a state, seen from `distance_m` away from `middle`, m, (3,), the image's middle.
 
         The azimuth is the direction of view from the x axis, counter-clockwise seen from above. The
         elevation is the angle of view above the horizon; negative looks down.
@@ -168,7 +168,7 @@ Corruption = Callable[[Picture, int], Picture]
 _NIGHT_SHARE: Final = (0.46, 0.5, 0.66)
 _NIGHT_GAMMA: Final = 1.1
 _NIGHT_NOISE: Final = 9.0  # Standard deviation of a sensor's noise at the highest gain, of 255.
-# Levels, of 255, that glare adds in its middle, and that it adds everywhere as a veil.
+# Levels, of 255, of the peak of glare, and of the veil that it adds everywhere in addition.
 _GLARE_PEAK, _GLARE_VEIL = 230.0, 28.0
 _BLUR: Final = 0.0125  # Standard deviation, as a share of the width: 2 of 160 pixels.
 # Ranges of the number of spots on a dirty lens, the radius of a spot as a share of the image's
@@ -182,7 +182,7 @@ _KEPT: Final = 64
 
 
 def night(picture: Picture, seed: int) -> Picture:
-    """Halve the brightness of an image, tint it blue, and add noise of 9 levels."""
+    """Roughly halve the brightness of an image, tint it blue, and add noise of 9 levels."""
     dark = np.empty(picture.shape, np.float32)
     for channel, table in enumerate(_night_tables()):
         dark[..., channel] = table[picture[..., channel]]
@@ -191,7 +191,7 @@ def night(picture: Picture, seed: int) -> Picture:
 
 
 def glare(picture: Picture, seed: int) -> Picture:
-    """Add light shining into the lens from the upper half of an image: up to 230 levels."""
+    """Add light shining into the lens from the upper half of an image: up to 258 levels."""
     return _bytes(picture + _glare(seed, *picture.shape[:2]))
 
 

@@ -69,7 +69,7 @@ class Rectifier:
 
     Each pixel of the virtual camera is a ray, which is turned by the pitch to find the pixel of the
     real camera. Differences in the height of cameras are not corrected. A WorldError is raised if
-    the camera does not cover the view of the virtual camera.
+    the camera misses more than 15 % of the virtual camera's pixels.
     """
 
     def __init__(self, geometry: CameraGeometry, size: tuple[int, int]) -> None:
@@ -186,7 +186,8 @@ def measure_camera(
     pose of a camera without distortion, with square pixels and its axis in the middle. `picture`,
     (height, width, 3), has the camera's whole field of view. Without `fovy_deg`, degrees, the board
     must be turned by some 30 to 45 degrees: seen straight on, a near board in a wide field of view
-    looks like a far board in a narrow one. Raises a WorldError if the geometry is not determined.
+    looks like a far board in a narrow one. Raises a WorldError if the image shows no such board, or
+    one that is tilted or does not determine the geometry.
     """
     with needing_extra("camera"):
         import cv2

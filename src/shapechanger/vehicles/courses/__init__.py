@@ -42,10 +42,10 @@ _STRAIGHT_RAD: Final = 0.35
 
 
 def start_pose(course: Course, seed: int) -> Pose:
-    """Draw a free pose on the route, in driving direction.
+    """Draw a free pose on the route, in driving direction; its first point if there is no free one.
 
-    There is no obstacle within 0.35 m of the route from 1 m behind to 2 m ahead, and the metre
-    behind is nearly straight, so that a trailer fits too.
+    A free pose has no obstacle within 0.35 m of the route from 1 m behind it to 2 m ahead, and the
+    metre behind it is nearly straight, so that a trailer fits too.
     """
     route = course.route
     free = np.ones(len(route), dtype=bool)

@@ -124,7 +124,7 @@ class Course:
 
 
 def require_element(vehicle: str, *, floats: bool, world: str) -> None:
-    """Raise a `WorldError` unless a world has water exactly if the vehicle floats."""
+    """Raise a `WorldError` if a vehicle that floats has no water, or another one has water."""
     if floats != (world in WATER):
         reason = "floats" if floats else "does not float"
         raise WorldError(f"A {vehicle} {reason}: it cannot drive in a {world}.")
@@ -163,8 +163,8 @@ class Look:
     def random(world: str, rng: np.random.Generator) -> Look:
         """Draw a look around the usual one of a world, uniformly, with one of `VARIANTS` textures.
 
-        `light` x 0.6 to 1.4 (at most 1), `warmth` +- 0.35, `contrast` +- 0.3, `gloss` x 0.4 to 1.6,
-        each channel of `wall` and `ground` x 0.75 to 1.0.
+        `light` x 0.6 to 1.4, `warmth` +- 0.35, `contrast` +- 0.3, `gloss` x 0.4 to 1.6, all clipped
+        to their ranges; each channel of `wall` and `ground` x 0.75 to 1.0.
         """
         usual = Look.of(world)
 

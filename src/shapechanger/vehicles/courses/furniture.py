@@ -34,7 +34,7 @@ def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
     return len(shares) - 1
 
 
-# Lengths of the route without obstacles after and before its first point, m; a truck is 1 m long.
+# Lengths of the route without obstacles after and before its first point, m; trucks have 0.84 m.
 _FREE_AHEAD_M, _FREE_BEHIND_M = 3.0, 2.0
 _BEFORE_DOORS_M: Final = 0.3  # Smallest distance from a door.
 
@@ -59,10 +59,10 @@ class Scatter:
 
 
 class LaneObstacles:
-    """Obstacles in a lane; an obstacle that would block the lane or a door is rejected.
+    """Obstacles in a lane; one that would block the lane, a door or the start is rejected.
 
-    Vehicles pass an obstacle on its wider side. Two obstacles that are passed on the same side may
-    be close together; two that are passed on different sides are at least `gap_m` apart.
+    Vehicles pass an obstacle on its wider side, which is at least the argument `gap_m` wide. Two
+    that are passed on the same side may be close together; others are 0.1 m farther apart than it.
     `route` and `half_width` are as in `Course`.
     """
 

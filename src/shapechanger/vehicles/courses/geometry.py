@@ -30,7 +30,7 @@ def arc_lengths(line: Array) -> Array:
 
 
 def interpolate(line: Array, knots: Array, s: Array) -> Array:
-    """Interpolate values at the points of a closed line, (n, k), at distances `s`, m: (m, k).
+    """Interpolate values at the points of a closed line, (n, k), at distances `s`, m, (j,): (j, k).
 
     `knots` are the `arc_lengths` of the line; distances wrap around.
     """

@@ -114,7 +114,7 @@ def _leg(rng: np.random.Generator, start: Array, end: Array, height: float) -> I
 
 _CEILING_M: Final = 2.5  # Height of the ceiling, and of every wall.
 _PITCH_M, _WIDTH_M, _LENGTH_M = (4.0, 6.0), (1.8, 2.4), (40.0, 90.0)
-_GAP_M: Final = 0.9  # Smallest gap next to an obstacle.
+_GAP_M: Final = 0.9  # Smallest gap on the wider side of an obstacle.
 
 # Furniture of common sizes along the walls; the width is the depth from the wall.
 _FURNITURE = (
@@ -241,7 +241,7 @@ def _plant(
         if rng.random() < 0.25:
             size = _FURNITURE[3] if rng.random() < 0.7 else _FURNITURE[1]
             obstacle = size.draw(rng, 0.0)
-            # The plant stands 2 cm from both walls.
+            # The obstacle stands 2 cm from both walls.
             x, y = corner - way + np.sign(way) * (obstacle.length / 2.0 + 0.02)
             obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(s))
 
@@ -303,7 +303,8 @@ def _dig_channel(rng: np.random.Generator, world: OpenWorld) -> tuple[Array, Arr
     """Try to lay out a route: points, m, (n, 2), and distance from the banks, m, (n,).
 
     The corners of a loop on a grid are smoothed more and more until the lane fits everywhere.
-    Returns None if the random loop is too tight or too close to itself.
+    Returns None if the loop is too tight, too close to itself, too long or too short, or if it
+    turns almost only one way.
     """
     points = random_loop(rng, int(rng.integers(world.cells[0], world.cells[1] + 1)), world.pitch)
     if points is None:

@@ -101,7 +101,7 @@ class QuadMesh:
         )  # fmt: skip
 
 
-# Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
+# Horizontal distance at which a lamp's light has halved, m.
 _REACH: Final = 1.6
 _SHADE: Final = 0.72  # Share of the light on a wall that faces away from the sun.
 # Light far from any lamp at full contrast, indoors and outdoors.
@@ -387,7 +387,7 @@ class MooredBoat(NamedTuple):
 
 
 def moored(course: Course) -> list[MooredBoat]:
-    """Boats along the rear sides of quays, as many as there is room for."""
+    """Up to `_MOST_BOATS` boats along the rear sides of quays, as there is room for them."""
     rng = np.random.default_rng([course.seed, 80])
     segments = wall_segments(course.walls)
     starts, ways = segments[:, :2], segments[:, 2:] - segments[:, :2]

@@ -58,7 +58,7 @@ def _stretch(knots: Field, size: int) -> Field:
 
 _Range = tuple[float, float]
 _SIZE, _TALL = 256, 512
-_SKIRTING: Final = 0.05  # Height of a skirting board divided by the height of a wall, 2.4 m.
+_SKIRTING: Final = 0.05  # Height of a skirting board divided by the height of its wall.
 _DARK: Final = (0.24, 0.22, 0.16)
 _FRAME: Final = (0.24, 0.22, 0.19)
 _STEEL: Final = (0.75, 0.75, 0.72)
@@ -70,7 +70,7 @@ def plain(colour: ArrayLike, height: int = _SIZE, width: int = _SIZE) -> Field:
 
 
 def plaster(rng: np.random.Generator) -> Field:
-    """Painted wall, 2.4 m high, with a dark skirting board, and sometimes a socket or a notice."""
+    """Painted wall with a dark skirting board, and often a socket or a notice."""
     height = width = _SIZE
     image = plain(np.array([0.83, 0.79, 0.62]) + rng.uniform(-0.05, 0.05, 3))
     image *= 1.0 + 0.03 * clouds(rng, height, width, 2, 3)[..., None]
@@ -101,7 +101,7 @@ def panel(rng: np.random.Generator) -> Field:
 
 
 def door(rng: np.random.Generator) -> Field:
-    """Wooden door in its frame, 2.1 m high, with a handle, a kick plate or a small window."""
+    """Wooden door in its frame with a handle, and in some panels, a kick plate or a window."""
     height, width = _TALL, _SIZE
     hue = np.array([0.46, 0.26, 0.12]) * rng.uniform(0.75, 1.25) + rng.uniform(-0.04, 0.04, 3)
     image = plain(hue, height, width)

@@ -18,7 +18,7 @@ from shapechanger.vehicles.world import MujocoWorld
 
 _STANDS_AFTER_S: Final = 0.5  # Time without an edge after which an encoder is still.
 _EDGES_PER_COUNT: Final = 4
-# HC-SR04: a ping at least every 60 ms takes 0.45 ms; without an echo it gives up after 38 ms.
+# HC-SR04: pings are at least 60 ms apart, and take 0.45 ms; it waits 38 ms for an echo.
 _CYCLE_NS: Final = 60_000_000
 _PING_NS: Final = 450_000
 _NO_ECHO_S: Final = 0.038
@@ -213,7 +213,7 @@ class SensedVehicle:
         return self._reflexes.bump.count
 
     def advance(self, ns: int, command: Sequence[float] | None) -> None:
-        """Advance time, and apply the limits at each tick; None keeps the applied actions."""
+        """Advance by `ns`, and apply the limits at each tick; None keeps the applied actions."""
         actions = self._plan.actions
         aims: tuple[float, ...] | None = None
         clips = ""
@@ -276,7 +276,7 @@ class SensedVehicle:
         self._parts = self._outputs()
 
     def _outputs(self) -> Mapping[str, float | None]:
-        """Return the output of each part, in the steps of its driver; the mean of shared parts."""
+        """Return each part's output in its driver's steps; the mean if several move the part."""
         shares: dict[str, list[float]] = {}
         values = output_values(self._plan, self.applied)
         for output, step, value in zip(self._plan.outputs, self._steps, values, strict=True):

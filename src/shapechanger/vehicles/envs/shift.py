@@ -24,7 +24,7 @@ def certify_vehicles(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> st
     """Compare two vehicles, including wrappers, and return the certificate of their shift.
 
     Both envs are reset and stepped, and remain in the middle of an episode. Raises EmptyShift if
-    the rollouts give the same observations, poses and rewards.
+    the rollouts give the same poses, rewards, and first and last observations.
     """
     names = _name(source), _name(target)
     old, new = _facts(source), _facts(target)

@@ -58,8 +58,8 @@ class VehicleEnv(DriveEnv):
     At a random place of a course that the seed draws, looking along it, at rest.
 
     ## End
-    Terminated when the bumper touches something, unless `collision_ends_episode` is 0. Truncated
-    after 1,000 steps.
+    Terminated when the bumper touches something or the vehicle stalls, unless `put_back` or if
+    `collision_ends_episode` is 0. Truncated after 1,000 steps.
 
     ## Info
     `progress`, metres along the course since the start; `collisions` of any part of the vehicle
@@ -270,8 +270,8 @@ class WaypointEnv(WaypointView, DriveEnv):
         robot: As in `VehicleEnv`.
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
             for a boat, so that only the bodies of vehicles differ.
-        sensed: Whether the sensors of `VehicleEnv` measure speed and reward, in shorter physics
-            steps; otherwise speed and reward are the true ones.
+        sensed: Whether the robot is simulated as in `VehicleEnv`, and its sensors measure speed
+            and reward; otherwise speed and reward are the true ones, as in `RangesEnv`.
         **task: `courses`, `randomise`, `put_back`, `lenses` and `render_mode` of `VehicleEnv`.
             Warping ignores errors of the camera's pose, so with `randomise` images show them.
 

@@ -1,4 +1,4 @@
-"""Expert driving with full knowledge of the course: planned paths, progress and a driver."""
+"""Expert driving with full knowledge of the course: planned paths and a driver."""
 
 from __future__ import annotations
 

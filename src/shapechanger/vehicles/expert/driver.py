@@ -138,7 +138,7 @@ _BLOCKED_M: Final = 0.15
 
 
 class _Recovery:
-    """Detects that a vehicle is stuck, and takes over until it is free."""
+    """Detects that a vehicle is stuck, and then takes over for a manoeuvre."""
 
     def __init__(self, traits: Traits, rng: np.random.Generator) -> None:
         self._traits = traits

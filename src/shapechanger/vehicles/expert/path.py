@@ -221,7 +221,7 @@ class CoursePath(ClosedLine):
     """A closed, evenly spaced path: a periodic cubic spline through `knots`, m, (n, 2).
 
     At each of the N points, `heading` is the direction, rad, counter-clockwise from the x axis;
-    `curvature`, 1/m, is positive to the left; `clearance` is the distance from obstacles, m.
+    `curvature`, 1/m, is positive to the left; `clearance` is the distance to walls or obstacles, m.
     """
 
     def __init__(self, knots: Array, obstacles: ClearanceField) -> None:

@@ -25,7 +25,7 @@ _LATE_S: Final = 0.5
 
 
 class FullThrottle:
-    """A policy without inputs that always returns full throttle."""
+    """A policy without inputs that returns full throttle, until a signal makes it fail."""
 
     def __init__(self, actions: Layout, state: Layout) -> None:
         self.net = CloneNetwork(

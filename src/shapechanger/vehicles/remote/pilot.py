@@ -98,7 +98,7 @@ def _has_waypoints(card: PolicyCard) -> bool:
 
 
 class PolicyDriver:
-    """Drives a robot by a policy from a person's permission to the person's next intervention.
+    """Drives a robot by a policy whenever a person permits it; the person may intervene.
 
     `run` drives in the thread that calls it. As a context manager, the driver has its own thread.
     `note` is its state as text; `on_note` is called whenever it changes. `waits` is the text to
