@@ -137,7 +137,7 @@ def test_names_and_collision_bits(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_the_size_is_as_declared(name: str) -> None:
+def test_a_body_is_within_its_declared_size(name: str) -> None:
     here = ground(name)
     hits: list[float] = []
     for geom in map(here.model.geom, range(here.model.ngeom)):

@@ -58,8 +58,8 @@ def test_cameras_render_their_models_in_turn() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_an_unclosed_camera_frees_its_context() -> None:
-    """Garbage collection frees the context; `close` can be called twice, and before an image."""
+def test_an_unclosed_camera_is_garbage_collected() -> None:
+    """Its context keeps no camera alive; `close` can be called twice, and before an image."""
     model, data = _model("1 0 0")
     dropped: list[weakref.ref[OnboardCamera]] = []
     for _ in range(3):
@@ -143,8 +143,8 @@ def _picture(height: int = 120, width: int = 160) -> Picture:
 
 @_ALL
 @pytest.mark.parametrize("size", [(120, 160), (33, 47), (1, 1), (1, 300), (300, 1), (1080, 1920)])
-def test_a_corruption_depends_on_image_and_seed(change: Corruption, size: tuple[int, int]) -> None:
-    """The result has the size and type of the image, which is not changed."""
+def test_image_and_seed_determine_a_corruption(change: Corruption, size: tuple[int, int]) -> None:
+    """The result has the image's size and type; the image stays the same. Blur ignores the seed."""
     before = _picture(*size)
     kept = before.copy()
     after = change(before, 3)
@@ -161,7 +161,7 @@ def test_a_corruption_depends_on_image_and_seed(change: Corruption, size: tuple[
         find_corruption("glair")
 
 
-def test_night_halves_the_brightness_and_adds_noise() -> None:
+def test_night_darkens_an_image_and_adds_noise() -> None:
     """Noise varies between images."""
     white = np.full((120, 160, 3), 255, np.uint8)
     dark = night(white, 0)
@@ -172,7 +172,7 @@ def test_night_halves_the_brightness_and_adds_noise() -> None:
     assert not np.array_equal(night(other, 0)[1:], dark[1:])
 
 
-def test_blur_keeps_the_sum() -> None:
+def test_blur_keeps_the_sum_and_adds_its_variance() -> None:
     point = np.zeros((121, 161, 3), np.uint8)
     point[56:65, 76:85] = 255
     soft = blur(point, 0).astype(float)[..., 0]

@@ -44,7 +44,7 @@ def square(world: str) -> Course:
 
 
 def with_walls(course: Course, *walls: Wall) -> Course:
-    """Return the course with other walls and no obstacles."""
+    """Return the course with other walls, and without obstacles and lamps."""
     return replace(course, walls=walls, obstacles=(), lamps=())
 
 

@@ -190,7 +190,7 @@ def test_without_a_free_start_the_first_point_is_used() -> None:
     ],
     ids=["a corner touches", "a hole", "two pieces"],
 )
-def test_self_touching_outlines_are_refused(cells: frozenset[tuple[int, int]]) -> None:
+def test_outlines_that_are_not_one_loop_are_refused(cells: frozenset[tuple[int, int]]) -> None:
     assert trace_outline(cells) is None
 
 

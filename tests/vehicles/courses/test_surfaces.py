@@ -52,7 +52,7 @@ def test_a_texture_is_small_varied_and_reproducible(name: str) -> None:
     "name",
     ["floor", "asphalt", "water", "sea", "paving", "grass", "hedge", "ceiling", "brick", "fence"],
 )
-def test_repeating_textures_have_no_seam(name: str) -> None:
+def test_repeating_textures_have_no_upright_seam(name: str) -> None:
     image = texture(name, 3).astype(float)
     inside = np.abs(np.diff(image, axis=1)).mean(axis=(0, 2))
     seam = np.abs(image[:, 0] - image[:, -1]).mean()

@@ -103,7 +103,7 @@ def test_a_collision_costs_and_ends_the_episode(
         assert found > 1 if put_back else found == 1
 
 
-def test_bang_steering_has_three_angles() -> None:
+def test_bang_steering_turns_half_into_full_steering() -> None:
     for steering, applied in (("bang", 1.0), ("proportional", 0.5)):
         with closing(_car(steering=steering)) as env:
             env.reset(seed=1)

@@ -154,7 +154,7 @@ def test_the_measured_response_matches_the_geometry() -> None:
     ("vehicle", "sensed"),
     [("car", True), *((entry.kwargs["vehicle"], False) for entry in WAYPOINT_ENVS.values())],
 )
-def test_following_true_waypoints_has_no_collisions(vehicle: str, sensed: bool) -> None:
+def test_following_the_experts_waypoints_has_no_collisions(vehicle: str, sensed: bool) -> None:
     with closing(WaypointEnv(vehicle, sensed=sensed, put_back=True)) as env:
         seen, _ = env.reset(options=_COURSE)
         assert env.observation_space.contains(seen)

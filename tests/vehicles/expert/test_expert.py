@@ -31,7 +31,7 @@ from shapechanger.vehicles.expert.path import plan_path
 
 
 def ring(seed: int, *, radius: float = 8.0, obstacles: int = 10) -> Course:
-    """Return a wavy ring, 2 m wide, with boxes and posts on both sides that leave gaps of 0.9 m."""
+    """Return a wavy ring, 2 m wide, with boxes and posts on both sides that leave 0.9 m or more."""
     half_width, gap = 1.0, 0.9
     rng = np.random.default_rng(seed)
     turns = np.linspace(0.0, 2 * np.pi, 400, endpoint=False)
@@ -81,7 +81,7 @@ def test_signed_distances_of_a_square() -> None:
 
 
 @given(station=st.floats(-200.0, 200.0))
-def test_at_inverts_nearest(station: float) -> None:
+def test_nearest_inverts_at(station: float) -> None:
     """`nearest` finds the station of a point that `at` returned, up to whole laps."""
     x, y = _RING.at(station)
     spot = _RING.nearest(x, y)
