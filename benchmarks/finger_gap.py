@@ -158,7 +158,7 @@ def _shipped_row(where: str, env: EnvRef) -> Row:
 
 
 def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
-    """Return how many targets each finger can hold, and a controller and policies reach."""
+    """Return how many targets each finger can hold, and how many controller and policy reach."""
     held, moved_to, controlled = (dict[int, NDArray[np.bool_]]() for _ in range(3))
     fingers = {seed: plan.task.target.having({"finger_seed": seed}) for seed in range(plan.seeds)}
     first = {seed: evaluation_seed(finger, TARGETS) for seed, finger in fingers.items()}

@@ -90,7 +90,7 @@ def generalist() -> list[Row]:
 
 
 def rows_of(found: list[Scores]) -> list[Row]:
-    """Return the speeds of both networks in each split and the extended ant, and who is ahead."""
+    """Return both networks' speeds in each split and in the extended ant, and which is ahead."""
     rows: list[Row] = []
     by_network = {
         network: [one for one in found if one.network == network] for network in ("limbs", "padded")

@@ -39,7 +39,7 @@ class Measured(NamedTuple):
     """Result of one method over all studies of a case.
 
     Attributes:
-        coverage: Share of intervals that contain the true value; missing intervals are included.
+        coverage: Share of studies whose interval contains the true value, or is missing.
         width: Median width; a missing interval has infinite width.
     """
 

@@ -2,8 +2,8 @@
 
 mutmut changes one operator, number or name of a function at a time, and runs the tests that call
 the function; a mutant is killed if one of them fails. `make mutants` runs all of them, some hours
-on two cores; `ONLY="guard metrics" make mutants` runs some. Results are kept in `mutants/`, and
-only mutants of files that have changed run again.
+on two cores; `ONLY="guard metrics" make mutants` runs some. Results are kept in `mutants/`, so
+that mutants of unchanged functions need not run again.
 
 Mutants are not counted if they only change the text of an error, a type for checkers, or `strict`
 of `zip`. Mutants in `equivalent_mutants.toml`, which are equivalent to the original for the reasons

@@ -28,7 +28,7 @@ SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
 # Seconds of the target's driving after which the other arms are compared with scratch.
 _SECONDS: Final = (15, 30)
-# Limit of collisions per 100 m, and number of pairs on which minutes should be halved; see `pairs`.
+# Limit of collisions per 100 m, and number of pairs on which fine-tuning should halve the minutes.
 FEW: Final = 3.0
 GOOD: Final = 8
 _ARMS: Final = ("scratch", "fine-tune", "rehearsal")

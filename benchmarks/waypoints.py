@@ -103,7 +103,7 @@ GOOD: Final = 4
 
 
 def pairs() -> list[Row]:
-    """Measure each land vehicle's policy in all of them, and steering clones, in the corridor."""
+    """Measure each land vehicle's policy in all three, and two steering clones, in the corridor."""
     found = _measure([*permutations(VEHICLES, 2), *((one, one) for one in VEHICLES)])
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         by_steering = dict(zip(STEERED, pool.map(_steered, STEERED), strict=True))

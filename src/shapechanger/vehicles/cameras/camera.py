@@ -144,7 +144,7 @@ class OutsideCamera(_Renderer):
         azimuth_rad: float,
         elevation_rad: float,
     ) -> NDArray[np.uint8]:
-        """Render a state, seen from `distance_m` away from `middle`, m, (3,), the image's middle.
+        """Render a state from `distance_m` away; `middle`, m, (3,), is in the middle of the image.
 
         The azimuth is the direction of view from the x axis, counter-clockwise seen from above. The
         elevation is the angle of view above the horizon; negative looks down.

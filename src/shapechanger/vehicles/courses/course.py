@@ -124,7 +124,7 @@ class Course:
 
 
 def require_element(vehicle: str, *, floats: bool, world: str) -> None:
-    """Raise a `WorldError` if a vehicle that floats has no water, or another one has water."""
+    """Raise a `WorldError` if a floating vehicle has no water, or another vehicle has water."""
     if floats != (world in WATER):
         reason = "floats" if floats else "does not float"
         raise WorldError(f"A {vehicle} {reason}: it cannot drive in a {world}.")

@@ -34,7 +34,7 @@ def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
     return len(shares) - 1
 
 
-# Lengths of the route without obstacles after and before its first point, m; trucks have 0.84 m.
+# Lengths of the route without obstacles after and before its first point, m; a truck has 0.84 m.
 _FREE_AHEAD_M, _FREE_BEHIND_M = 3.0, 2.0
 _BEFORE_DOORS_M: Final = 0.3  # Smallest distance from a door.
 
@@ -62,7 +62,7 @@ class LaneObstacles:
     """Obstacles in a lane; one that would block the lane, a door or the start is rejected.
 
     Vehicles pass an obstacle on its wider side, which is at least the argument `gap_m` wide. Two
-    that are passed on the same side may be close together; others are 0.1 m farther apart than it.
+    that are passed on the same side may be close together; others are `gap_m` + 0.1 m apart.
     `route` and `half_width` are as in `Course`.
     """
 

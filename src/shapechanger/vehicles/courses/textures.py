@@ -101,7 +101,7 @@ def panel(rng: np.random.Generator) -> Field:
 
 
 def door(rng: np.random.Generator) -> Field:
-    """Wooden door in its frame with a handle, and in some panels, a kick plate or a window."""
+    """Wooden door in its frame with a handle, and sometimes panels, a kick plate or a window."""
     height, width = _TALL, _SIZE
     hue = np.array([0.46, 0.26, 0.12]) * rng.uniform(0.75, 1.25) + rng.uniform(-0.04, 0.04, 3)
     image = plain(hue, height, width)

@@ -225,7 +225,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """Take one step of one control period.
 
         Raises:
-            SpaceMismatch: If the action is not two numbers, or one of them is not a number (NaN).
+            SpaceMismatch: If the action is not two numbers, or one of them is NaN.
             ResetNeeded: If `reset` was never called.
         """
         if self._needs_reset:

@@ -31,8 +31,8 @@ def certify_vehicles(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> st
     one, two = _drive(source), _drive(target)
     if all(map(np.array_equal, one, two)):
         raise EmptyShift(
-            f"{names[0]} and {names[1]} behave the same: {2 * _HALF} steps gave equal frames, "
-            "places and rewards, so there is nothing to transfer."
+            f"{names[0]} and {names[1]} behave the same: equal commands gave equal poses, "
+            "rewards, and first and last observations, so there is nothing to transfer."
         )
     changes = [f"  {name}: {old[name]} -> {new[name]}" for name in old if old[name] != new[name]]
     answers = [f"  {sentence}" for sentence in _answers(source, one, two)]

@@ -58,7 +58,7 @@ class VehicleEnv(DriveEnv):
     At a random place of a course that the seed draws, looking along it, at rest.
 
     ## End
-    Terminated when the bumper touches something or the vehicle stalls, unless `put_back` or if
+    Terminated by a collision, which the bumper or a stall reveals, unless `put_back` is set or
     `collision_ends_episode` is 0. Truncated after 1,000 steps.
 
     ## Info
