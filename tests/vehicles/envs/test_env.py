@@ -117,7 +117,7 @@ def test_invalid_steps_are_refused() -> None:
         with pytest.raises(gym.error.ResetNeeded, match="reset"):
             env.step(_AHEAD)
         env.reset(seed=1)
-        for action in (np.zeros(3), np.array([np.nan, 0.0]), "left"):
+        for action in (np.zeros(3), np.array([np.nan, 0.0]), np.array([0.0, np.inf]), "left"):
             with pytest.raises((SpaceMismatch, ValueError)):
                 env.step(action)  # pyright: ignore[reportArgumentType]  # The misuse.
         assert env.render() is None

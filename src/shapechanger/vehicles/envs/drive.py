@@ -225,15 +225,15 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """Take one step of one control period.
 
         Raises:
-            SpaceMismatch: If the action is not two numbers, or one of them is NaN.
+            SpaceMismatch: If the action is not two finite numbers.
             ResetNeeded: If `reset` was never called.
         """
         if self._needs_reset:
             raise gym.error.ResetNeeded("Call reset() before the first step.")
-        values = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        values = np.asarray(action, np.float64)
         if values.shape != (2,) or not np.isfinite(values).all():
-            raise SpaceMismatch(f"An action is steering and throttle, got {np.asarray(action)}.")
-        collided, terms, seen, info = self._advance(values)
+            raise SpaceMismatch(f"An action is steering and throttle, got {values}.")
+        collided, terms, seen, info = self._advance(np.clip(values, -1.0, 1.0))
         info |= terms
         info["reward_terms"] = terms
         return seen, sum(terms.values()), self._reward.ends(collided), False, info
