@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 import pytest
@@ -179,6 +181,44 @@ def test_two_pairs_of_the_same_geoms_are_two_contacts() -> None:
     assert found == {"ball + floor": (3,), "ball + floor (2)": (1,)}
     for flag in ("contact='disable'", "constraint='disable'"):
         assert _contacts(_scene(flag=flag, contact=pair)) == {}
+
+
+def test_friction_has_its_own_softness_only_where_it_differs() -> None:
+    """A pair without `solreffriction`, or with the same as `solref`, has one softness."""
+    pair = "<pair geom1='floor' geom2='ball' solref='.03 1' {}/>"
+    ends = (
+        "",
+        "solreffriction='.03 1'",
+        "solreffriction='.1 2'",
+        "solreffriction='.1 2' condim='1'",
+    )
+    found = _contacts(_scene(contact="".join(map(pair.format, ends))))
+    assert ["friction solref" in contact for contact in found.values()] == [0, 0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("field", "floor", "ball"),
+    [
+        *(("solmix", *mixes) for mixes in ((1e-16, 3e-16), (1e-15, 3e-15), (3e-15, 1e-15))),
+        *(("solref", *refs) for refs in (((0.03, 0.0), (0.02, 1.0)), ((0.02, 1.0), (0.03, 0.0)))),
+        *(("solref", *refs) for refs in (((0.0, 1.0), (0.02, 0.5)), ((0.02, 0.5), (0.0, 1.0)))),
+    ],
+)
+def test_parameters_at_a_bound_are_mixed_as_in_mujoco(field: str, floor: Any, ball: Any) -> None:
+    model = _scene(floor="solref='.03 1'", ball="solref='.05 2'")
+    getattr(model.geom("floor"), field)[:], getattr(model.geom("ball"), field)[:] = floor, ball
+    _assert_equal(_contacts(model)["ball + floor"], _simulated(model)["ball + floor"][0])
+
+
+def test_a_child_that_comes_before_a_part_of_its_parent_does_not_touch_it() -> None:
+    child = "<body name='c'><joint/><geom name='c' size='.1'/></body>"
+    part = "<body name='p'><geom name='p' size='.1'/></body>"
+    model = _scene(children=child + part)
+    assert (
+        set(_contacts(model))
+        == set(_simulated(model))
+        == {"ball + floor", "c + floor", "floor + p"}
+    )
 
 
 def test_static_and_unsupported_pairs_are_left_out() -> None:

@@ -18,6 +18,7 @@ from shapechanger.morphology.certificate import compare, fingerprint
 from shapechanger.morphology.certificate.changes import fingerprints
 from shapechanger.morphology.certificate.numbers import (
     MOVED,
+    TABLE,
     Field,
     Numbers,
     made_arrays,
@@ -48,13 +49,16 @@ _RARE = """
       <joint name="hinge" axis="0 1 0" stiffness="1" springyield=".1"/>
       <geom size=".1"/><site name="eye" pos="0 0 .2"/>
     </body>
+    <body pos="9 0 1"><joint name="swivel" type="ball"/><geom size=".1"/></body>
   </worldbody>
   <tendon><spatial name="rope" stiffness="1" springyield=".1" actuatorfrcrange="-1 1">
     <site site="eye"/><site site="hook"/></spatial></tendon>
   <actuator>
     <motor name="slow" joint="hinge" delay=".01" nsample="4" damping=".1" armature=".2"/>
     <motor name="winch" tendon="rope"/>
+    <orientation joint="swivel"/>
   </actuator>
+  <equality><joint joint1="hinge"/></equality>
 </mujoco>
 """
 
@@ -185,9 +189,23 @@ def test_signs_of_zeros_and_of_quaternions_are_ignored() -> None:
     for array in (model.body_pos, model.jnt_pos, model.geom_margin, model.qpos0, model.wrap_prm):
         array[array == 0.0] = -0.0
     assert repr(moved_numbers(model)) == repr(nominal)
-    for array in (model.body_quat, model.body_iquat, model.geom_quat, model.site_quat):
-        array *= -1.0
-    assert moved_numbers(model) == nominal
+    quaternions = (model.body_quat, model.body_iquat, model.geom_quat, model.site_quat)
+    for turned in (False, True):  # By 180° about x.
+        for array in quaternions if turned else ():
+            array[:] = (0.0, 1.0, 0.0, 0.0)
+        nominal = moved_numbers(model)
+        for array in quaternions:
+            array *= -1.0
+        assert moved_numbers(model) == nominal
+
+
+def test_a_spring_that_is_a_polynomial_is_one_of_its_own_element() -> None:
+    model = everything()
+    before = moved_numbers(model)
+    model.tendon_stiffnesspoly[0] = model.jnt_stiffnesspoly[1] = 1.0
+    after = moved_numbers(model)
+    for section, changed in (("tendons", "string"), ("joints", "shoulder")):
+        assert [n for n, row in after[section].items() if row != before[section][n]] == [changed]
 
 
 def _set(model: mujoco.MjModel, flags: str, bit: int) -> None:
@@ -222,6 +240,7 @@ _UNSEEN: dict[str, Callable[[mujoco.MjModel], object]] = {
     "bias that the type ignores": lambda m: m.actuator("motor").biasprm.fill(7.0),
     "tendon range without a limit": lambda m: m.tendon_range.__setitem__(1, 7.0),
     "geom parameters under a pair": lambda m: m.geom("leg").friction.fill(0.5),
+    "tolerance of sleep that is off": lambda m: setattr(m.opt, "sleep_tolerance", 0.5),
     "magnetic field": lambda m: m.opt.magnetic.fill(0.5),
     "override that is off": lambda m: m.opt.o_friction.fill(0.5),
     "energy flag": lambda m: _set(m, "enableflags", mujoco.mjtEnableBit.mjENBL_ENERGY),
@@ -256,31 +275,51 @@ def test_values_without_effect_are_left_out(what: str) -> None:
         assert fingerprint(written) != fingerprint(nominal)
 
 
-@pytest.mark.parametrize(("density", "viscosity"), [(1.2, 0.0), (0.0, 0.1), (0.0, 0.0)])
+@pytest.mark.parametrize(("density", "viscosity"), [(0.2, 0.0), (0.0, 0.1), (0.0, 0.0)])
 def test_wind_and_fluid_shapes_count_only_in_a_medium(density: float, viscosity: float) -> None:
     for edit in (lambda m: m.opt.wind.fill(3.0), lambda m: m.geom_fluid[:, 3].fill(7.0)):
         model = everything()
-        model.opt.wind[:] = 0.0
+        model.opt.wind[:], model.geom_fluid[:, 1] = 0.0, 0.0
         model.opt.density, model.opt.viscosity = density, viscosity
         still = moved_numbers(model)
         edit(model)
         assert (moved_numbers(model) != still) == bool(density or viscosity)
 
 
-def test_empty_bodies_are_left_out() -> None:
-    """Bodies that hold only a camera are left out; parents of shapes stay."""
+def test_what_has_no_part_in_the_motion_is_left_out() -> None:
+    """Bodies that hold only a camera are left out; bodies of moving masses and of pins stay."""
     xml = (
-        "<mujoco><worldbody><geom type='plane' size='1 1 1'/>{}<body name='b'><freejoint/>"
-        "<geom size='.1'/>{}</body></worldbody></mujoco>"
+        "<mujoco><asset><hfield name='h' nrow='2' ncol='2' size='1 1 1 1'/>{}</asset><worldbody>"
+        "<geom type='hfield' hfield='h'/><body name='b'><freejoint/><geom size='.1'/>{}</body>{}"
+        "</worldbody><equality>{}</equality></mujoco>"
     )
+    spare = "<hfield name='i' nrow='3' ncol='2' size='1 1 1 1'/>"
     mount = "<body name='mount'><camera/></body>"
+    load = "<body name='load'><inertial mass='.5' pos='0 0 0' diaginertia='1 1 1'/></body>"
     shelf = "<body name='shelf'><body name='stone'><geom size='.1'/></body></body>"
-    plain, mounted, shelved = (
-        moved_numbers(mujoco.MjModel.from_xml_string(xml.format(*parts)))
-        for parts in (("", ""), ("", mount), (shelf, ""))
+    pin = "<connect body1='mount' body2='b' anchor='0 0 0'/>"
+
+    def model(*parts: str) -> mujoco.MjModel:
+        return mujoco.MjModel.from_xml_string(xml.format(*parts))
+
+    plain = model("", "", "", "")
+    assert moved_numbers(model(spare, mount, mount.replace("mount", "post"), "")) == (
+        moved_numbers(plain)
     )
-    assert mounted == plain
-    assert list(shelved["bodies"]) == ["b", "shelf", "stone"]
+    found = moved_numbers(model("", load, mount + shelf, pin))["bodies"]
+    assert list(found) == ["b", "load", "mount", "shelf", "stone"]
+    plain.body_mass[1] = plain.geom_contype[:] = plain.geom_conaffinity[:] = 0.0
+    assert list(moved_numbers(plain)["bodies"]) == ["b"]  # Its joint moves.
+
+
+def test_every_geom_that_can_touch_a_flex_counts() -> None:
+    geoms = (
+        "<geom name='wall' size='.1' conaffinity='0'/><geom name='drawn' size='.1' contype='0' "
+        "conaffinity='0'/><body><freejoint/><geom name='ball' size='.1' contype='0' "
+        "conaffinity='0'/></body></worldbody><contact><pair geom1='ball' geom2='floor'/></contact>"
+    )
+    model = mujoco.MjModel.from_xml_string(_CLOTH.replace("</worldbody>", geoms))
+    assert list(moved_numbers(model)["geoms"]) == ["ball", "floor", "wall"]
 
 
 _PID = """<mujoco>
@@ -320,7 +359,9 @@ def test_switches_and_rare_features_count(
     nominal, written = (mujoco.MjModel.from_xml_string(text) for _ in range(2))
     write(written)
     assert fingerprint(written) != fingerprint(nominal)
-    assert compare(nominal, written)
+    found = {each.element: each.quantity for each in compare(nominal, written)}
+    assert {found[name] for name in TABLE["whole"] if name in found} <= {"type", "array"}
+    assert found
 
 
 def test_a_fingerprint_is_the_same_in_every_process() -> None:
@@ -371,6 +412,12 @@ def test_names_equal_those_of_name_elements(name: str) -> None:
     assert fingerprint(named) == fingerprint(asset(name))
 
 
+def test_elements_without_a_name_are_named_after_their_kind_or_target() -> None:
+    names = names_of(_rare())
+    assert names["actuators"] == ["slow", "winch", "swivel"]
+    assert (names["equalities"], names["bodies"]) == (["equality"], ["world", "hinge", "swivel"])
+
+
 _PLAIN = """<mujoco>
   <asset><texture name="sky" type="skybox" builtin="flat" width="4" height="4"/></asset>
   <worldbody><body name="leg"><joint name="knee"/>
@@ -378,7 +425,7 @@ _PLAIN = """<mujoco>
     <camera name="eye" pos="0 0 1"/><light pos="0 0 3"/></body></worldbody>
   <sensor><jointpos name="angle" joint="knee" cutoff="1"/><force site="toe"/></sensor>
   <keyframe><key name="home" qpos="0.5"/></keyframe>
-  <custom><numeric name="target" data="1 2"/></custom>
+  <custom><numeric name="target" data="1e-20 2e-20"/></custom>
 </mujoco>"""
 
 
@@ -388,7 +435,8 @@ _PLAIN = """<mujoco>
         ("0 0 0.1", "0 0 0.2", False),
         ('cutoff="1"', 'cutoff="2"', False),
         ('qpos="0.5"', 'qpos="0.6"', False),
-        ('data="1 2"', 'data="1 3"', False),
+        ('data="1e-20 2', 'data="1e-20 3', False),
+        ('name="home"', 'name="rest"', False),
         ('jointpos name="angle"', 'jointvel name="angle"', False),
         ('0 0 1"/><light', '0 0 2"/><light', True),
         ("1 0 0 1", "0 1 0 1", True),

@@ -224,7 +224,7 @@ def matched_commands(
                 lows, highs = zip(bounds, other[name], strict=True)
                 share = np.random.default_rng([seed, *name.encode()]).random(steps)
                 values = max(lows) + (min(highs) - max(lows)) * share
-            commands[:, place] = np.clip(values, *np.asarray(bounds, np.float32))
+            commands[:, place] = np.clip(values, *bounds)
         return commands
 
     return draw(one, two), draw(two, one)
@@ -299,8 +299,8 @@ def _gaps(before: _Floats, after: _Floats) -> tuple[_Floats, _Floats]:
     same = (before == after) | (np.isnan(before) & np.isnan(after))
     with np.errstate(invalid="ignore"):
         gaps = np.where(same, 0.0, np.abs(before - after))
-    gaps = np.nan_to_num(gaps, nan=_LARGEST, posinf=_LARGEST)
-    known = np.nan_to_num(np.maximum(np.abs(before), np.abs(after)), nan=1.0, posinf=1.0)
+    gaps = np.nan_to_num(gaps, nan=_LARGEST)  # It makes infinity the largest number, too.
+    known = np.nan_to_num(np.maximum(np.abs(before), np.abs(after)), posinf=1.0)
     scale = np.maximum(known.max(axis=0), 1.0)
     return gaps, (np.minimum(gaps / scale, 1.0) / _TOLERANCE).max(axis=1)
 

@@ -102,7 +102,7 @@ def _times(before: Values, after: Values) -> str:
     """Format the ratio of new to old, if all numbers that are not zero have the same ratio."""
     if len(before) != len(after) or len(_finite((*before, *after))) != 2 * len(before):
         return ""
-    old, new = np.array(before, float), np.array(after, float)
+    old, new = np.array(before), np.array(after)
     used = old != 0.0
     ratios = new[used] / old[used]
     # Three digits are shown, so ratios that agree to four are one ratio.
@@ -243,7 +243,7 @@ def _equal(before: Values | None, after: Values | None, scale: float = 0.0) -> b
     if any(isinstance(value, str) for value in (*before, *after)):
         return False
     limit = max(ROUNDING * _largest((*before, *after)), _NOISE * scale)
-    old, new = np.array(before, float), np.array(after, float)
+    old, new = np.array(before), np.array(after)
     return np.allclose(old, new, rtol=0.0, atol=limit, equal_nan=True)
 
 

@@ -99,7 +99,7 @@ KINDS: Final = {
 
 def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
     """Return the kind of element of each index in arrays of mixed kinds; "" for no element."""
-    section = {kind: name for name, (_, _, kind) in KINDS.items()} | {_O.mjOBJ_XBODY: "bodies"}
+    section = {kind: name for name, (_, _, kind) in KINDS.items()}
     ends = zip(m.actuator_trntype.tolist(), m.actuator_trnid[:, 1].tolist(), strict=True)
     ties = zip(m.eq_type.tolist(), m.eq_objtype.tolist(), strict=True)
     return {
@@ -160,7 +160,7 @@ def made_arrays(m: mujoco.MjModel) -> dict[str, Any]:
     ):
         on = [key for key, bit in switches.items() if bits & bit.value and key.startswith(prefix)]
         words = [key.removeprefix(prefix).lower() for key in on]
-        found[name] = np.array([[word for word in words if word not in _QUIET]], np.str_)
+        found[name] = np.array([[word for word in words if word not in _QUIET]])
     return found | kinds_of(m)
 
 
@@ -229,7 +229,7 @@ def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
         values["solimp"][:] = option.o_solimp
         values["margin"][:] = option.o_margin
     dimensions = values["dim"].astype(np.int64)
-    acting = np.array([_FRICTION_COUNT[dimension] for dimension in dimensions.tolist()], np.int64)
+    acting = np.array([_FRICTION_COUNT[dimension] for dimension in dimensions.tolist()])
     friction = np.maximum(values["friction"], mujoco.mjMINMU)
     values["friction"] = np.where(np.arange(5) < acting[:, None], friction, 0.0)
     softness, own = (_safe_solref(model, values[name]) for name in ("solref", "solreffriction"))
@@ -350,11 +350,10 @@ class _Reader:
             return self._made[name]
         if name.startswith("opt_"):
             return np.asarray(getattr(self._model.opt, name.removeprefix("opt_"))).reshape(1, -1)
-        values = getattr(self._model, name)
-        return np.frombuffer(bytes(values), np.uint8) if name == "plugin_attr" else values
+        return getattr(self._model, name)
 
     def _split(self, array: str, values: Any) -> list[Any]:
-        first = "jnt_dofadr" if array.startswith("dof_") else TABLE["first_rows"].get(array, "")
+        first = "jnt_dofadr" if array.startswith("dof_") else TABLE["first_rows"].get(array)
         return np.split(values, getattr(self._model, first)[1:]) if first else list(values)
 
     def values(self, field: Field) -> Any:
@@ -364,16 +363,14 @@ class _Reader:
             members = [getattr(mujoco, field.of)(value) for value in values.ravel().tolist()]
             return np.array([member.name.partition("_")[2].lower() for member in members])
         if field.of:
-            words = [
-                "" if i < 0 else self.names[kind][i] if kind else str(i)
-                for kind, i in self._indices(field)
-            ]
-            return np.array(words, np.str_)
+            # Elements without a kind, such as pulleys, have the index -1.
+            words = ["" if i < 0 else self.names[kind][i] for kind, i in self._indices(field)]
+            return np.array(words)
         if field.array.endswith("quat") and not field.array.startswith("key_"):
             # Of the two quaternions of a rotation, use the one that begins with a positive number.
             leading = np.argmax(values != 0.0, axis=1)[:, None]
             return values * np.where(np.take_along_axis(values, leading, axis=1) < 0.0, -1.0, 1.0)
-        if "_solref" in field.array and not field.array.startswith("opt_"):
+        if "_solref" in field.array:
             return _safe_solref(self._model, values)
         return values
 
@@ -389,10 +386,8 @@ class _Reader:
         for section in ("actuators", "tendons", "equalities"):
             for field in MOVED[section].values():
                 if field.of and not field.of.startswith("mjt"):
-                    acts = self.array(field.where) if field.where else None
-                    for i, (kind, index) in enumerate(self._indices(field)):
-                        if acts is None or acts[i]:  # An actuator's second target may be no site.
-                            used[kind].add(index)
+                    for kind, index in self._indices(field):
+                        used[kind].add(index)
         geoms, sites, bodies = (
             np.isin(np.arange(len(self.names[kind])), list(used[kind]))
             for kind in ("geoms", "sites", "bodies")
@@ -451,8 +446,7 @@ def names_of(model: mujoco.MjModel) -> dict[str, list[str]]:
         owner = "" if owners is None else f"{bodies[owners[i]]}_"
         return owner + title.partition(" ")[0]
 
-    # Actuators come last, because they are named after their targets.
-    for section in (*(kind for kind in KINDS if kind != "actuators"), "actuators"):
+    for section in KINDS:  # Actuators, which are named after their targets, come after them.
         free = unique_namer(names[section])
         for i, name in enumerate(names[section]):
             names[section][i] = name or free(default(section, i))
