@@ -74,10 +74,6 @@ def _extend(spec: mujoco.MjSpec) -> None:
             ["hip_1: joint range (-30, 30) deg -> none"],
         ),
         (
-            lambda s: setattr(s.option, "gravity", [0, 0, -4.905]),
-            ["simulation: gravity (0, 0, -9.81) m/s² -> (0, 0, -4.905) m/s² (x0.5)"],
-        ),
-        (
             lambda s: setattr(s.actuators[0], "gear", [75, 0, 0, 0, 0, 0]),
             ["hip_4: gear 150 -> 75 (x0.5)"],
         ),
@@ -87,6 +83,7 @@ def _extend(spec: mujoco.MjSpec) -> None:
                 "ankle_1, ankle_2, ankle_3, ankle_4: mass 0.06759 kg -> 0.1245 kg (x1.84)",
                 "ankle_1, ankle_2, ankle_3, ankle_4: length 0.5657 m -> 1.131 m (x2)",
                 "robot: total mass 0.9109 kg -> 1.138 kg (x1.25)",
+                "left_ankle_geom: position (0.2, 0.2, 0) m -> (0.4, 0.4, 0) m (x2)",
             ],
         ),
         (
@@ -136,14 +133,9 @@ def _resize(model: mujoco.MjModel, geom: str, **values: float) -> None:
     [
         (
             lambda: asset("half_cheetah"),
-            lambda m: _resize(m, "head", pos=0.5),
+            lambda m: _resize(m, "head", pos=0.0),
             "head: length 0.3 m -> 0.45 m (x1.5)\nhead: radius 0.046 m -> 0.069 m (x1.5)\n"
-            "head: position (0.6, 0, 0.1) m -> 0.5 each m",
-        ),
-        (
-            lambda: asset("half_cheetah"),
-            lambda m: m.geom("head").pos.__setitem__(0, 0.7),
-            "head: position (0.6, 0, 0.1) m -> (0.7, 0, 0.1) m",
+            "head: position (0.6, 0, 0.1) m -> 0 each m",
         ),
         (
             lambda: asset("ant"),
@@ -186,8 +178,7 @@ def test_a_length_needs_the_geom_in_both_models() -> None:
     assert not {"length", "radius"} & {each.quantity for each in found}
 
 
-@pytest.mark.parametrize("field", ["tolerance", "impratio"])
-def test_tolerances_are_relative(field: str) -> None:
+def test_tolerances_are_relative() -> None:
     """A number is compared by its size, and the fingerprint distinguishes the same numbers."""
     for one, two, same in (
         *((1e-18, 2e-18, False), (math.nan, math.nan, True), (math.inf, math.inf, True)),
@@ -195,7 +186,7 @@ def test_tolerances_are_relative(field: str) -> None:
     ):
         models = everything(), everything()
         for model, value in zip(models, (one, two), strict=True):
-            setattr(model.opt, field, value)
+            model.opt.impratio = value
         assert (compare(*models) == ()) == same
         assert (fingerprint(models[0]) == fingerprint(models[1])) == same
 
