@@ -9,6 +9,7 @@ import html
 import json
 import posixpath
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from inspect import cleandoc, formatannotation
 from pathlib import Path
@@ -22,6 +23,7 @@ from msgspec import inspect
 
 from scripts.site_pages import api_pages, environment_pages, wiring_pages
 from scripts.wiring_diagrams import table
+from shapechanger.contract.pages import Page
 from shapechanger.robot.drivers.chip import Keys
 from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.link.messages import ClientMessage, RobotMessage
@@ -105,6 +107,9 @@ class FencedExamples(griffe.Extension):
     def on_instance(self, *, obj: griffe.Object, **_: Any) -> None:
         """Rewrite the docstring of an object that Griffe has read."""
         if obj.docstring is not None:
+            loaded: Any = getattr(sys.modules.get(obj.module.path), obj.name, None)
+            if isinstance(loaded, type) and issubclass(loaded, Page):
+                obj.docstring.value = cleandoc(loaded.__doc__ or "")  # With inherited sections.
             obj.docstring.value = _EXAMPLE.sub(
                 lambda match: f"```pycon\n{match[0].rstrip()}\n```\n", obj.docstring.value
             )

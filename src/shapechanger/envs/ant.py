@@ -158,29 +158,22 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     ## Observation space
     `Box(-inf, inf, (105,), float64)`, for the unedited body:
 
-    | Num    | Observation     | Min     | Max     | Unit   |
-    | ------ | --------------- | ------- | ------- | ------ |
-    | 0      | `torso/z`       | -inf    | inf     | m      |
-    | 1      | `torso/qw`      | -1      | 1       | 1      |
-    | 2      | `torso/qx`      | -1      | 1       | 1      |
-    | 3      | `torso/qy`      | -1      | 1       | 1      |
-    | 4      | `torso/qz`      | -1      | 1       | 1      |
-    | 5      | `hip_1/angle`   | -0.5236 | 0.5236  | rad    |
-    | 6      | `ankle_1/angle` | 0.5236  | 1.222   | rad    |
-    | 7      | `hip_2/angle`   | -0.5236 | 0.5236  | rad    |
-    | 8      | `ankle_2/angle` | -1.222  | -0.5236 | rad    |
-    | 9      | `hip_3/angle`   | -0.5236 | 0.5236  | rad    |
-    | 10     | `ankle_3/angle` | -1.222  | -0.5236 | rad    |
-    | 11     | `hip_4/angle`   | -0.5236 | 0.5236  | rad    |
-    | 12     | `ankle_4/angle` | 0.5236  | 1.222   | rad    |
-    | 13     | `torso/vx`      | -inf    | inf     | m/s    |
-    | 14     | `torso/vy`      | -inf    | inf     | m/s    |
-    | 15     | `torso/vz`      | -inf    | inf     | m/s    |
-    | 16     | `torso/wx`      | -inf    | inf     | rad/s  |
-    | 17     | `torso/wy`      | -inf    | inf     | rad/s  |
-    | 18     | `torso/wz`      | -inf    | inf     | rad/s  |
-    | 19-26  | `*/velocity`    | -inf    | inf     | rad/s  |
-    | 27-104 | `*/contact/*`   | -1      | 1       | N·m, N |
+    | Num    | Observation        | Min     | Max     | Unit   |
+    | ------ | ------------------ | ------- | ------- | ------ |
+    | 0      | `torso/z`          | -inf    | inf     | m      |
+    | 1-4    | `torso/qw` to `qz` | -1      | 1       | 1      |
+    | 5      | `hip_1/angle`      | -0.5236 | 0.5236  | rad    |
+    | 6      | `ankle_1/angle`    | 0.5236  | 1.222   | rad    |
+    | 7      | `hip_2/angle`      | -0.5236 | 0.5236  | rad    |
+    | 8      | `ankle_2/angle`    | -1.222  | -0.5236 | rad    |
+    | 9      | `hip_3/angle`      | -0.5236 | 0.5236  | rad    |
+    | 10     | `ankle_3/angle`    | -1.222  | -0.5236 | rad    |
+    | 11     | `hip_4/angle`      | -0.5236 | 0.5236  | rad    |
+    | 12     | `ankle_4/angle`    | 0.5236  | 1.222   | rad    |
+    | 13-15  | `torso/vx` to `vz` | -inf    | inf     | m/s    |
+    | 16-18  | `torso/wx` to `wz` | -inf    | inf     | rad/s  |
+    | 19-26  | `*/velocity`       | -inf    | inf     | rad/s  |
+    | 27-104 | `*/contact/*`      | -1      | 1       | N·m, N |
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost - contact_cost`: 1 while healthy, plus the velocity
@@ -203,6 +196,20 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     `reward_forward`, `reward_ctrl`, `reward_contact` and `reward_survive`. `diverged` if the
     simulation has diverged.
 
+    ## Arguments
+    - `forward_reward_weight` (1): factor of the velocity, s/m.
+    - `ctrl_cost_weight` (0.5): factor of the sum of squared actions.
+    - `contact_cost_weight` (0.0005): factor of the sum of squared contact forces.
+    - `healthy_reward` (1): reward of each step while healthy.
+    - `main_body` (1): body whose velocity is rewarded, by number or name.
+    - `terminate_when_unhealthy` (True): whether an episode ends when the ant is unhealthy.
+    - `contact_force_range` (-1, 1): limits to which contact forces are clipped.
+    - `reset_noise_scale` (0.1): size of the noise at the start.
+    - `exclude_current_positions_from_observation` (True): whether the torso's x and y are left out.
+    - `include_cfrc_ext_in_observation` (True): whether contact forces are observed.
+    - `xml_file` ("ant.xml"): file of the unedited body.
+    - `frame_skip` (5): physics steps of an action.
+
     ## Versions
     v1: the first.
 
@@ -210,7 +217,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         body: Name of an ant, edits of `shapechanger.morphology`, or their JSON.
         healthy_z_range: Heights of the torso between which the ant is healthy, m; None derives the
             upper one from the body and sets no lower one.
-        **arguments: All arguments of `Ant-v5` and of `Reshapable`.
+        **arguments: The arguments in the two lists above.
     """
 
     family = ANT
@@ -422,52 +429,33 @@ class ExtendedAntEnv(AntEnv):
     ## Observation space
     `Box(-inf, inf, (137,), float64)`, for the unedited body:
 
-    | Num    | Observation     | Min     | Max     | Unit   |
-    | ------ | --------------- | ------- | ------- | ------ |
-    | 0      | `torso/z`       | -inf    | inf     | m      |
-    | 1      | `torso/qw`      | -1      | 1       | 1      |
-    | 2      | `torso/qx`      | -1      | 1       | 1      |
-    | 3      | `torso/qy`      | -1      | 1       | 1      |
-    | 4      | `torso/qz`      | -1      | 1       | 1      |
-    | 5      | `hip_1/angle`   | -0.5236 | 0.5236  | rad    |
-    | 6      | `ankle_1/angle` | 0.5236  | 0.8727  | rad    |
-    | 7      | `foot_1/angle`  | 0.5236  | 1.222   | rad    |
-    | 8      | `hip_2/angle`   | -0.5236 | 0.5236  | rad    |
-    | 9      | `ankle_2/angle` | -0.8727 | -0.5236 | rad    |
-    | 10     | `foot_2/angle`  | -1.222  | -0.5236 | rad    |
-    | 11     | `hip_3/angle`   | -0.5236 | 0.5236  | rad    |
-    | 12     | `ankle_3/angle` | -0.8727 | -0.5236 | rad    |
-    | 13     | `foot_3/angle`  | -1.222  | -0.5236 | rad    |
-    | 14     | `hip_4/angle`   | -0.5236 | 0.5236  | rad    |
-    | 15     | `ankle_4/angle` | 0.5236  | 0.8727  | rad    |
-    | 16     | `foot_4/angle`  | 0.5236  | 1.222   | rad    |
-    | 17     | `torso/vx`      | -inf    | inf     | m/s    |
-    | 18     | `torso/vy`      | -inf    | inf     | m/s    |
-    | 19     | `torso/vz`      | -inf    | inf     | m/s    |
-    | 20     | `torso/wx`      | -inf    | inf     | rad/s  |
-    | 21     | `torso/wy`      | -inf    | inf     | rad/s  |
-    | 22     | `torso/wz`      | -inf    | inf     | rad/s  |
-    | 23-34  | `*/velocity`    | -inf    | inf     | rad/s  |
-    | 35-136 | `*/contact/*`   | -1      | 1       | N·m, N |
-
-    ## Reward
-    As for `AntEnv`.
-
-    ## Start
-    As for `AntEnv`.
-
-    ## End
-    As for `AntEnv`.
-
-    ## Info
-    As for `AntEnv`.
+    | Num    | Observation        | Min     | Max     | Unit   |
+    | ------ | ------------------ | ------- | ------- | ------ |
+    | 0      | `torso/z`          | -inf    | inf     | m      |
+    | 1-4    | `torso/qw` to `qz` | -1      | 1       | 1      |
+    | 5      | `hip_1/angle`      | -0.5236 | 0.5236  | rad    |
+    | 6      | `ankle_1/angle`    | 0.5236  | 0.8727  | rad    |
+    | 7      | `foot_1/angle`     | 0.5236  | 1.222   | rad    |
+    | 8      | `hip_2/angle`      | -0.5236 | 0.5236  | rad    |
+    | 9      | `ankle_2/angle`    | -0.8727 | -0.5236 | rad    |
+    | 10     | `foot_2/angle`     | -1.222  | -0.5236 | rad    |
+    | 11     | `hip_3/angle`      | -0.5236 | 0.5236  | rad    |
+    | 12     | `ankle_3/angle`    | -0.8727 | -0.5236 | rad    |
+    | 13     | `foot_3/angle`     | -1.222  | -0.5236 | rad    |
+    | 14     | `hip_4/angle`      | -0.5236 | 0.5236  | rad    |
+    | 15     | `ankle_4/angle`    | 0.5236  | 0.8727  | rad    |
+    | 16     | `foot_4/angle`     | 0.5236  | 1.222   | rad    |
+    | 17-19  | `torso/vx` to `vz` | -inf    | inf     | m/s    |
+    | 20-22  | `torso/wx` to `wz` | -inf    | inf     | rad/s  |
+    | 23-34  | `*/velocity`       | -inf    | inf     | rad/s  |
+    | 35-136 | `*/contact/*`      | -1      | 1       | N·m, N |
 
     ## Versions
     v1: the first.
 
     Args:
         body: As for `AntEnv`, such as "ExtendedAntPassive", whose third segments have no motors.
-        **arguments: All other arguments of `AntEnv`.
+        **arguments: `healthy_z_range` of `AntEnv`, and the arguments in the two lists above.
     """
 
     def __init__(self, body: BodyLike = "ExtendedAnt", **arguments: Any) -> None:

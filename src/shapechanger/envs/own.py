@@ -195,19 +195,63 @@ def require_robot(model: mujoco.MjModel, path: Path) -> None:
 class OwnRobotEnv(Reshapable, EzPickle):
     """A robot from an MJCF or URDF file, with a built-in or custom task.
 
-    - **Observation**: positions and velocities of all joints, without the position of the trunk on
-      the floor; or the numbers in the task's `observe`. `observation_layout` names each number.
-    - **Action**: one number per actuator, within its `ctrlrange`; `action_layout` has names, units
-      and gains.
-    - **Reward**: the sum of the terms that the task returns, which `info` lists as `reward_...`.
-    - **Robot**: all bodies that the actuators move, see
-      `shapechanger.morphology.pose.robot_bodies`. Only the robot has a trunk and a standing height,
-      starts with noise, and is lifted to the floor; objects keep their start pose in the file.
-    - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
-      at least a tenth of its range inside its limits; the feet stand above the floor, and the
-      equations of coupled joints and closed loops hold as exactly as in the file. The standing
-      height is the height in this pose.
-    - **End**: when the task ends it, or when the simulation diverges, with a reward of 0.
+    The robot consists of all bodies that the actuators move, see
+    `shapechanger.morphology.pose.robot_bodies`. Only the robot has a trunk and a standing height,
+    starts with noise, and is lifted to the floor; objects keep their start pose in the file.
+
+    ## Action space
+    One number per actuator, `float32`, within its `ctrlrange`; `action_layout` has names, units and
+    gains. An action lasts 20 ms, or `frame_skip` physics steps. For the dog of
+    `docs/own-bodies.md`, `Box(-1, 1, (2,), float32)`:
+
+    | Num | Action        | Min | Max | Unit |
+    | --- | ------------- | --- | --- | ---- |
+    | 0   | `front/motor` | -1  | 1   | 1    |
+    | 1   | `back/target` | -1  | 1   | rad  |
+
+    ## Observation space
+    Positions and velocities of all joints, without the position of the trunk on the floor; or the
+    numbers in the task's `observe`. `observation_layout` names each number. For the same dog,
+    `Box(-inf, inf, (15,), float64)`:
+
+    | Num   | Observation        | Min    | Max   | Unit  |
+    | ----- | ------------------ | ------ | ----- | ----- |
+    | 0     | `trunk/z`          | -inf   | inf   | m     |
+    | 1-4   | `trunk/qw` to `qz` | -1     | 1     | 1     |
+    | 5     | `front/angle`      | -1.047 | 1.047 | rad   |
+    | 6     | `back/angle`       | -1.047 | 1.047 | rad   |
+    | 7-9   | `trunk/vx` to `vz` | -inf   | inf   | m/s   |
+    | 10-12 | `trunk/wx` to `wz` | -inf   | inf   | rad/s |
+    | 13    | `front/velocity`   | -inf   | inf   | rad/s |
+    | 14    | `back/velocity`    | -inf   | inf   | rad/s |
+
+    ## Reward
+    The sum of the terms that the task returns. For the task `walk`, whose weights `task_options`
+    replaces, with the trunk's velocity along x, v, m/s, and actions scaled to -1 to 1, a:
+
+    ```text
+    reward_forward =  1 v
+    reward_alive   =  1 unless the robot has fallen
+    reward_control = -0.1 sum(a^2)
+    ```
+
+    ## Start
+    The keyframe `home` if the model has one, else the model's own pose with each joint at least a
+    tenth of its range inside its limits, with noise of `reset_noise_scale`; the feet stand above
+    the floor, and the equations of coupled joints and closed loops hold as exactly as in the file.
+    The standing height is the height in this pose without noise.
+
+    ## End
+    Terminated when the task ends it, or when the simulation diverges, with a reward of 0. The task
+    `walk` ends when the trunk is lower than 0.4 times its standing height or tilts by more than 90
+    degrees. Truncated after 1,000 steps, or `max_episode_steps` of `gym.make`.
+
+    ## Info
+    `x_position` and `y_position` of the trunk, m; `x_velocity` and `y_velocity`, m/s; the terms of
+    the reward as `reward_...`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`.
@@ -220,7 +264,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         frame_skip: Physics steps per action; None for a step of 20 ms.
         reset_noise_scale: Half-width of the uniform noise of the start pose, rad and m, and
             standard deviation of the noise of its velocities, rad/s and m/s.
-        **arguments: Arguments of Gymnasium's `MujocoEnv` and of `Reshapable`.
+        **arguments: The common arguments above.
 
     Attributes:
         task: The task.

@@ -88,12 +88,17 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
     ## Info
     `reward_survive`. `diverged` if the simulation has diverged.
 
+    ## Arguments
+    - `reset_noise_scale` (0.01): size of the noise at the start.
+    - `xml_file` ("inverted_pendulum.xml"): file of the unedited body.
+    - `frame_skip` (2): physics steps of an action.
+
     ## Versions
     v1: the first.
 
     Args:
         body: Name of a pendulum, edits of `shapechanger.morphology`, or their JSON.
-        **arguments: All arguments of `InvertedPendulum-v5` and of `Reshapable`.
+        **arguments: The arguments in the two lists above.
     """
 
     family = PENDULUM
@@ -185,13 +190,19 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
     `reward_survive`, `distance_penalty` and `velocity_penalty`. `diverged` if the simulation has
     diverged.
 
+    ## Arguments
+    - `healthy_reward` (10): reward of each step while the poles stand.
+    - `reset_noise_scale` (0.1): size of the noise at the start.
+    - `xml_file` ("inverted_double_pendulum.xml"): file of the unedited body.
+    - `frame_skip` (5): physics steps of an action.
+
     ## Versions
     v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON. It
             must keep two hinges, which the observation and the reward rely on.
-        **arguments: All arguments of `InvertedDoublePendulum-v5` and of `Reshapable`.
+        **arguments: The arguments in the two lists above.
     """
 
     family = DOUBLE_PENDULUM

@@ -22,6 +22,7 @@ with needing_extra("sim"):
     import mujoco
     from gymnasium.envs.mujoco import MujocoEnv
 
+from shapechanger.contract.pages import Page
 from shapechanger.envs.checks import check_action, check_arguments
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
 from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures, prepare_scene
@@ -54,7 +55,7 @@ BAD_STATE: Final = slice(
 _OWN_ARGUMENTS: Final[dict[str, Any]] = {"shadows": None, "fast_model": True, "towards": None}
 
 
-class Reshapable(MujocoEnv):
+class Reshapable(Page, MujocoEnv):
     """Mixin that gives a Gymnasium MuJoCo env any body of a family, and named spaces.
 
     The env keeps its rewards, terminations, infos and arguments. Model, spaces, layouts and start
@@ -63,16 +64,22 @@ class Reshapable(MujocoEnv):
     An env without a `render_mode` stores the textures of bodies and skies at half their width and
     height, to save memory.
 
-    Three arguments are available in every env:
-
-    - `shadows`: whether frames have shadows, reflections and smoothed edges. By default, frames of
-      more than 256 x 256 pixels have them, and smaller ones, which render faster without them,
-      do not.
-    - `fast_model`: whether a cheaper model with bit-equal motion may step the physics, while
+    ## Common arguments
+    - `render_mode` (None): "human", "rgb_array", "depth_array" or "rgbd_tuple".
+    - `width` (480) and `height` (480) of frames, pixels.
+    - `camera_id` (None) or `camera_name` (None): a camera of the model, by number or name, that
+      frames show; `default_camera_config`: settings of the camera that shows them otherwise, such
+      as `{"distance": 4.0}`.
+    - `max_geom` (1000): largest number of shapes in a frame; `visual_options` (None): flags of
+      MuJoCo's `mjtVisFlag`, keyed by number.
+    - `shadows` (None): whether frames have shadows, reflections and smoothed edges. By default,
+      frames of more than 256 x 256 pixels have them, and smaller ones, which render faster without
+      them, do not.
+    - `fast_model` (True): whether a cheaper model with bit-equal motion may step the physics, while
       MuJoCo's profiling clock (`data.timer`) is paused. Ants and single pendulums may have such a
       model; other envs accept the argument and ignore it.
-    - `towards`: another body of the family with the same spaces. Each reset then draws a body
-      uniformly between `body` and `towards`, unless the reset gives a body.
+    - `towards` (None): another body of the family with the same spaces. Each reset then draws a
+      body uniformly between `body` and `towards`, unless the reset gives a body.
 
     Attributes:
         family: The bodies that the env can have.

@@ -222,12 +222,20 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `x_position`, m; `x_velocity`, m/s; `reward_forward` and `reward_ctrl`. `diverged` if the
     simulation has diverged.
 
+    ## Arguments
+    - `forward_reward_weight` (1): factor of the velocity, s/m.
+    - `ctrl_cost_weight` (0.1): factor of the sum of squared actions.
+    - `reset_noise_scale` (0.1): size of the noise at the start.
+    - `exclude_current_positions_from_observation` (True): whether the trunk's x is left out.
+    - `xml_file` ("half_cheetah.xml"): file of the unedited body.
+    - `frame_skip` (5): physics steps of an action.
+
     ## Versions
     v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        **arguments: All arguments of `HalfCheetah-v5` and of `Reshapable`.
+        **arguments: The arguments in the two lists above.
     """
 
     family = HALF_CHEETAH
@@ -289,6 +297,18 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `x_position`, and `z_distance_from_origin`, m; `x_velocity`, m/s; `reward_forward`,
     `reward_ctrl` and `reward_survive`. `diverged` if the simulation has diverged.
 
+    ## Arguments
+    - `forward_reward_weight` (1): factor of the velocity, s/m.
+    - `ctrl_cost_weight` (0.001): factor of the sum of squared actions.
+    - `healthy_reward` (1): reward of each step while healthy.
+    - `terminate_when_unhealthy` (True): whether an episode ends when the hopper is unhealthy.
+    - `healthy_state_range` (-100, 100): limits of all other numbers of a healthy state.
+    - `healthy_angle_range` (-0.2, 0.2): limits of a healthy torso's lean, rad.
+    - `reset_noise_scale` (0.005): size of the noise at the start.
+    - `exclude_current_positions_from_observation` (True): whether the torso's x is left out.
+    - `xml_file` ("hopper.xml"): file of the unedited body.
+    - `frame_skip` (4): physics steps of an action.
+
     ## Versions
     v1: the first.
 
@@ -296,7 +316,7 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
         healthy_z_range: Least and largest healthy height of the torso, m; None derives them from
             the body.
-        **arguments: All other arguments of `Hopper-v5` and of `Reshapable`.
+        **arguments: The arguments in the two lists above.
     """
 
     family = HOPPER
@@ -357,6 +377,17 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `x_position`, and `z_distance_from_origin`, m; `x_velocity`, m/s; `reward_forward`,
     `reward_ctrl` and `reward_survive`. `diverged` if the simulation has diverged.
 
+    ## Arguments
+    - `forward_reward_weight` (1): factor of the velocity, s/m.
+    - `ctrl_cost_weight` (0.001): factor of the sum of squared actions.
+    - `healthy_reward` (1): reward of each step while healthy.
+    - `terminate_when_unhealthy` (True): whether an episode ends when the walker is unhealthy.
+    - `healthy_angle_range` (-1, 1): limits of a healthy torso's lean, rad.
+    - `reset_noise_scale` (0.005): size of the noise at the start.
+    - `exclude_current_positions_from_observation` (True): whether the torso's x is left out.
+    - `xml_file` ("walker2d_v5.xml"): file of the unedited body.
+    - `frame_skip` (4): physics steps of an action.
+
     ## Versions
     v1: the first.
 
@@ -364,7 +395,7 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
         healthy_z_range: Least and largest healthy height of the torso, m; None derives them from
             the body.
-        **arguments: All other arguments of `Walker2d-v5` and of `Reshapable`.
+        **arguments: The arguments in the two lists above.
     """
 
     family = WALKER2D
@@ -413,12 +444,20 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
     `reward_forward` and `reward_ctrl`. `diverged` if the simulation has diverged.
 
+    ## Arguments
+    - `forward_reward_weight` (1): factor of the velocity, s/m.
+    - `ctrl_cost_weight` (0.0001): factor of the sum of squared actions.
+    - `reset_noise_scale` (0.1): size of the noise at the start.
+    - `exclude_current_positions_from_observation` (True): whether the head's x and y are left out.
+    - `xml_file` ("swimmer.xml"): file of the unedited body.
+    - `frame_skip` (4): physics steps of an action.
+
     ## Versions
     v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        **arguments: All arguments of `Swimmer-v5` and of `Reshapable`.
+        **arguments: The arguments in the two lists above.
     """
 
     family = SWIMMER
@@ -463,10 +502,7 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | Num     | Observation             | Min     | Max      | Unit            |
     | ------- | ----------------------- | ------- | -------- | --------------- |
     | 0       | `torso/z`               | -inf    | inf      | m               |
-    | 1       | `torso/qw`              | -1      | 1        | 1               |
-    | 2       | `torso/qx`              | -1      | 1        | 1               |
-    | 3       | `torso/qy`              | -1      | 1        | 1               |
-    | 4       | `torso/qz`              | -1      | 1        | 1               |
+    | 1-4     | `torso/qw` to `qz`      | -1      | 1        | 1               |
     | 5       | `abdomen_z/angle`       | -0.7854 | 0.7854   | rad             |
     | 6       | `abdomen_y/angle`       | -1.309  | 0.5236   | rad             |
     | 7       | `abdomen_x/angle`       | -0.6109 | 0.6109   | rad             |
@@ -484,12 +520,8 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | 19      | `left_shoulder1/angle`  | -1.047  | 1.484    | rad             |
     | 20      | `left_shoulder2/angle`  | -1.047  | 1.484    | rad             |
     | 21      | `left_elbow/angle`      | -1.571  | 0.8727   | rad             |
-    | 22      | `torso/vx`              | -inf    | inf      | m/s             |
-    | 23      | `torso/vy`              | -inf    | inf      | m/s             |
-    | 24      | `torso/vz`              | -inf    | inf      | m/s             |
-    | 25      | `torso/wx`              | -inf    | inf      | rad/s           |
-    | 26      | `torso/wy`              | -inf    | inf      | rad/s           |
-    | 27      | `torso/wz`              | -inf    | inf      | rad/s           |
+    | 22-24   | `torso/vx` to `vz`      | -inf    | inf      | m/s             |
+    | 25-27   | `torso/wx` to `wz`      | -inf    | inf      | rad/s           |
     | 28-44   | `*/velocity`            | -inf    | inf      | rad/s           |
     | 45-174  | `*/inertia/*`           | -inf    | inf      | kg·m², kg·m, kg |
     | 175-252 | `*/twist/*`             | -inf    | inf      | rad/s, m/s      |
@@ -516,6 +548,22 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `tendon_length`, m, and `tendon_velocity`, m/s; `reward_forward`, `reward_ctrl`,
     `reward_contact` and `reward_survive`. `diverged` if the simulation has diverged.
 
+    ## Arguments
+    - `forward_reward_weight` (1.25): factor of the velocity, s/m.
+    - `ctrl_cost_weight` (0.1): factor of the sum of squared actions.
+    - `contact_cost_weight` (5e-07): factor of the sum of squared contact forces.
+    - `contact_cost_range` (-inf, 10): limits of the cost of contact.
+    - `healthy_reward` (5): reward of each step while healthy.
+    - `terminate_when_unhealthy` (True): whether an episode ends when the humanoid is unhealthy.
+    - `reset_noise_scale` (0.01): size of the noise at the start.
+    - `exclude_current_positions_from_observation` (True): whether the torso's x and y are left out.
+    - `include_cinert_in_observation` (True): whether inertias are observed.
+    - `include_cvel_in_observation` (True): whether twists are observed.
+    - `include_qfrc_actuator_in_observation` (True): whether drives are observed.
+    - `include_cfrc_ext_in_observation` (True): whether contact forces are observed.
+    - `xml_file` ("humanoid.xml"): file of the unedited body.
+    - `frame_skip` (5): physics steps of an action.
+
     ## Versions
     v1: the first.
 
@@ -523,7 +571,7 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
         healthy_z_range: Least and largest healthy height of the torso, m; None derives them from
             the body.
-        **arguments: All other arguments of `Humanoid-v5` and of `Reshapable`.
+        **arguments: The arguments in the two lists above.
     """
 
     family = HUMANOID

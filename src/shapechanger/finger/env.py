@@ -15,6 +15,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import Measure
+from shapechanger.contract.pages import Page
 from shapechanger.envs.checks import check_action
 from shapechanger.envs.opengl import choose_gl, require_screen
 from shapechanger.envs.renderer import Renderer, body_reach, draw
@@ -56,21 +57,35 @@ SMOOTHNESS: Final = Measure("smoothness", "1", "smoothness", "episode")
 """1 minus half the mean absolute change of a tendon's command in a step."""
 
 
-class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
+class FingerEnv(Page, gym.Env[Any, NDArray[np.float32]], EzPickle):
     """An index finger moved by seven tendons; derived classes define the task.
 
-    Args:
-        actions: Meaning of an action; see `shapechanger.finger.tensions.DRIVES`.
-        parameters: Parameters of the finger: `FingerParameters`, their JSON, a mapping of changed
-            parameters, or the name of a set, "an-1983"; None for the nominal finger.
-        gap: Distribution from which the finger is drawn instead of using `parameters`, its name or
-            a mapping of its ranges; see `shapechanger.finger.gap`.
-        finger_seed: Seed of the finger drawn from the gap; None draws another finger at each reset
-            (domain randomisation).
-        reward: Weights that replace the default ones, keyed by name.
-        render_mode: "human", "rgb_array" or "depth_array".
-        width: Width of frames, pixels.
-        height: Height of frames, pixels.
+    ## Action space
+    `Box(-1, 1, (7,), float32)`, one command per tendon, which lasts 0.02 s. The argument `actions`
+    sets the meaning of a command: "impedance", a muscle whose tension grows with its length;
+    "tension"; or "length".
+
+    | Num | Action        | Min | Max | Unit |
+    | --- | ------------- | --- | --- | ---- |
+    | 0   | `FDP/command` | -1  | 1   | 1    |
+    | 1   | `FDS/command` | -1  | 1   | 1    |
+    | 2   | `EIP/command` | -1  | 1   | 1    |
+    | 3   | `EDC/command` | -1  | 1   | 1    |
+    | 4   | `LUM/command` | -1  | 1   | 1    |
+    | 5   | `DI/command`  | -1  | 1   | 1    |
+    | 6   | `PI/command`  | -1  | 1   | 1    |
+
+    ## Common arguments
+    - `actions` ("impedance"): meaning of an action; see `shapechanger.finger.tensions.DRIVES`.
+    - `parameters` (None): parameters of the finger: `FingerParameters`, their JSON, a mapping of
+      changed parameters, or the name of a set, "an-1983"; None for the nominal finger.
+    - `gap` (None): distribution from which the finger is drawn instead of using `parameters`, its
+      name or a mapping of its ranges; see `shapechanger.finger.gap`.
+    - `finger_seed` (None): seed of the finger drawn from the gap; None draws another finger at each
+      reset (domain randomisation).
+    - `reward` (None): weights that replace the default ones, keyed by name.
+    - `render_mode` (None): "human", "rgb_array" or "depth_array".
+    - `width` (480) and `height` (480) of frames, pixels.
 
     Attributes:
         plant: The simulated finger, with its ground truth.

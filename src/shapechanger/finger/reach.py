@@ -30,21 +30,6 @@ class FingerReachEnv(FingerEnv):
     muscles of the hand; `shapechanger.finger.anatomy` has its numbers and their sources. Tendons
     pull several joints at once, so a posture needs most tendons together.
 
-    ## Action space
-    `Box(-1, 1, (7,), float32)`, one command per tendon, which lasts 0.02 s. The argument `actions`
-    sets the meaning of a command: "impedance", a muscle whose tension grows with its length;
-    "tension"; or "length".
-
-    | Num | Action        | Min | Max | Unit |
-    | --- | ------------- | --- | --- | ---- |
-    | 0   | `FDP/command` | -1  | 1   | 1    |
-    | 1   | `FDS/command` | -1  | 1   | 1    |
-    | 2   | `EIP/command` | -1  | 1   | 1    |
-    | 3   | `EDC/command` | -1  | 1   | 1    |
-    | 4   | `LUM/command` | -1  | 1   | 1    |
-    | 5   | `DI/command`  | -1  | 1   | 1    |
-    | 6   | `PI/command`  | -1  | 1   | 1    |
-
     ## Observation space
     `Box(-inf, inf, (38,), float64)`: angles and velocities of the joints; tensions, lengths
     relative to the straight finger, and newest commands of the tendons; the fingertip computed from
@@ -67,15 +52,9 @@ class FingerReachEnv(FingerEnv):
     | 14    | `PI/tension`          | 0        | 25     | N     |
     | 15-21 | `*/length`            | -inf     | inf    | m     |
     | 22-28 | `*/command`           | -1       | 1      | 1     |
-    | 29    | `fingertip/x`         | -inf     | inf    | m     |
-    | 30    | `fingertip/y`         | -inf     | inf    | m     |
-    | 31    | `fingertip/z`         | -inf     | inf    | m     |
-    | 32    | `target/x`            | -inf     | inf    | m     |
-    | 33    | `target/y`            | -inf     | inf    | m     |
-    | 34    | `target/z`            | -inf     | inf    | m     |
-    | 35    | `target/dx`           | -inf     | inf    | m     |
-    | 36    | `target/dy`           | -inf     | inf    | m     |
-    | 37    | `target/dz`           | -inf     | inf    | m     |
+    | 29-31 | `fingertip/x` to `z`  | -inf     | inf    | m     |
+    | 32-34 | `target/x` to `z`     | -inf     | inf    | m     |
+    | 35-37 | `target/dx` to `dz`   | -inf     | inf    | m     |
 
     With `goal=True` a Dict of `observation` (32, as above without the target), `achieved_goal` (3)
     and `desired_goal` (3), for learners with hindsight.
@@ -112,7 +91,7 @@ class FingerReachEnv(FingerEnv):
 
     Args:
         goal: Whether observations are Dicts with goals.
-        **arguments: Arguments of `FingerEnv`.
+        **arguments: The common arguments above.
     """
 
     measures = (SUCCESS, RETURN, SMOOTHNESS)

@@ -52,18 +52,31 @@ class RigMixin(FingerEnv):
 
     The simulation is never stepped: it shows the state of the rig for rendering and rewards.
 
+    ## On a rig
+    The spaces equal the simulation's, so a script runs on both envs if the id is changed. The env
+    converts commands to tensions, by the newest lengths and speeds of the tendons at the servos. On
+    a rig with encoders at its joints the angles are measured, with noise, and velocities are
+    differences of angles over 20 ms, smoothed over 40 ms. Without encoders, angles and velocities
+    are computed from lengths and speeds of the tendons, and are as accurate as the nominal moment
+    arms. The fingertip is computed from the angles. Distance, reward and `info["is_success"]` are
+    computed from the measured angles, or from the true state of the env's own twin (`twin`).
+
+    ## Common arguments
+    - `robot` ("finger"): name of a known rig, or its address as HOST or HOST:PORT. A twin of the
+      profile "finger" that runs on this machine has the name "finger".
+    - `twin` (""): twin that this env runs instead of connecting to `robot`: "nominal", or the name
+      of the gap from which its finger is drawn.
+    - `finger_seed` (None): seed of the finger drawn from the gap; None for 0.
+    - `twin_folder` (""): folder of a twin on this machine, for its true state.
+    - `actions` ("impedance"): meaning of an action; see `shapechanger.finger.tensions.DRIVES`.
+    - `reward` (None): weights that replace the default ones, keyed by name.
+    - `render_mode` (None): "human", "rgb_array" or "depth_array" of the finger as measured.
+    - `width` (480) and `height` (480) of frames, pixels.
+    - `key` (""), `fingerprint` (""), `on_reset` ("operator"), `on_waiting` (None) and
+      `reset_timeout_s` (60): as for `RemoteVehicleEnv`.
+
     Args:
-        robot: Name of a known rig, or its address as HOST or HOST:PORT. A twin of the profile
-            "finger" that runs on this machine has the name "finger".
         task: Arguments of the class of the task.
-        twin: Twin that this env runs instead of connecting to `robot`: "nominal", or the name of
-            the gap from which its finger is drawn; "" to connect to `robot`.
-        finger_seed: Seed of the finger drawn from the gap; None for 0.
-        twin_folder: Folder of a twin on this machine, for its true state; "" for none.
-        actions: Meaning of an action; see `shapechanger.finger.tensions.DRIVES`.
-        **more: `reward`, `render_mode` (of the finger as measured), `width` and `height` of
-            `FingerEnv`; `key` and `fingerprint`, for an address, `on_reset`, `on_waiting` and
-            `reset_timeout_s` of `RemoteVehicleEnv`.
 
     Raises:
         UnknownName: If the name of the rig, twin, mode of action or weight is unknown.
@@ -267,22 +280,6 @@ class RigMixin(FingerEnv):
 class RemoteFingerEnv(RigMixin, FingerReachEnv):
     """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
 
-    ## Action space
-    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`, so a script runs on both envs if the
-    id is changed. The env converts commands to tensions, by the newest lengths and speeds of the
-    tendons at the servos. A command lasts 0.02 s.
-
-    ## Observation space
-    `Box(-inf, inf, (38,), float64)`, the table of `Finger-v1`. On a rig with encoders at its joints
-    the angles are measured, with noise, and velocities are differences of angles over 20 ms,
-    smoothed over 40 ms. Without encoders, angles and velocities are computed from lengths and
-    speeds of the tendons, and are as accurate as the nominal moment arms. The fingertip is computed
-    from the angles.
-
-    ## Reward
-    The formulas of `Finger-v1`. Distance, reward and `info["is_success"]` are computed from the
-    measured angles, or from the true state of the env's own twin (`twin`).
-
     ## Start
     The operator arms a rig; the env arms a twin. For up to 1 s, the env moves the finger to the
     start of `Finger-v1` for the same seed. The measured error is a few hundredths of a radian, or
@@ -294,17 +291,18 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     link. `info["truncated_because"]` is the reason.
 
     ## Info
-    As `Finger-v1`, and from `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
-    `refused`, `events`, `latency`, `armed`, `emergency`, `absent`, `truncated_because`. With
-    `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), of the twin.
+    The keys of `Finger-v1`: `is_success`, `distance`, `target`, `smoothness` and the terms of the
+    reward; and of `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`, `events`,
+    `latency`, `armed`, `emergency`, `absent`, `truncated_because`. With `twin_folder` or `twin`
+    also `true_distance`, m, and `true_angles`, rad, (4,), of the twin.
 
     ## Versions
     v1: the first.
 
     Args:
-        robot: Name of a known rig, or its address; see `RigMixin`.
+        robot: Name of a known rig, or its address.
         goal: Whether observations are Dicts with goals.
-        **rig: Arguments of `RigMixin`.
+        **rig: The common arguments above.
 
     Raises:
         UnknownName, LinkError, RobotRefused: As `RigMixin`.
@@ -317,16 +315,6 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
 class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
     """Follow a point that moves along a known path with a real finger, or its twin.
 
-    ## Action space
-    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`, converted as in `RemoteFinger-v1`.
-
-    ## Observation space
-    `Box(-inf, inf, (47,), float64)`, the table of `FingerTrack-v1`, measured as in
-    `RemoteFinger-v1`.
-
-    ## Reward
-    The formulas of `FingerTrack-v1`, on the state that `RemoteFinger-v1` uses.
-
     ## Start
     The finger is brought to the point of the path where `FingerTrack-v1` starts for the same seed,
     as in `RemoteFinger-v1`; then the point moves.
@@ -336,15 +324,16 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
     reason.
 
     ## Info
-    As `FingerTrack-v1`, and the entries of a rig as in `RemoteFinger-v1`.
+    The keys of `FingerTrack-v1`: `is_success`, `distance`, `rms`, `target`, `smoothness` and the
+    terms of the reward; and the keys of a rig and its twin as in `RemoteFinger-v1`.
 
     ## Versions
     v1: the first.
 
     Args:
-        robot: Name of a known rig, or its address; see `RigMixin`.
+        robot: Name of a known rig, or its address.
         path: As for `FingerTrack-v1`.
-        **rig: Arguments of `RigMixin`.
+        **rig: The common arguments above.
 
     Raises:
         PathError: If `path` is not a path, or the nominal finger cannot follow it.

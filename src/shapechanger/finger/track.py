@@ -138,23 +138,43 @@ SEEN_S: Final = np.array([0.0, CONTROL_DT, *PREVIEW_S])
 class FingerTrackEnv(FingerEnv):
     """Follow a point that moves along a known path.
 
-    ## Action space
-    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`.
-
     ## Observation space
-    `Box(-inf, inf, (47,), float64)`: the table of `Finger-v1` with the point at the end of the next
-    step as target; then the vectors, m, from the fingertip to the point 0.06, 0.12 and 0.20 s from
-    now:
+    `Box(-inf, inf, (47,), float64)`: the numbers of `Finger-v1` with the point at the end of the
+    next step as target; then the vectors from the fingertip to the points 0.06, 0.12 and 0.20 s
+    from now.
 
-    | Num   | Observation              | Min  | Max | Unit |
-    | ----- | ------------------------ | ---- | --- | ---- |
-    | 38-40 | `ahead_60ms/dx` to `dz`  | -inf | inf | m    |
-    | 41-43 | `ahead_120ms/dx` to `dz` | -inf | inf | m    |
-    | 44-46 | `ahead_200ms/dx` to `dz` | -inf | inf | m    |
+    | Num   | Observation              | Min      | Max    | Unit  |
+    | ----- | ------------------------ | -------- | ------ | ----- |
+    | 0     | `MCP_flexion/angle`      | -0.3491  | 1.571  | rad   |
+    | 1     | `MCP_abduction/angle`    | -0.3491  | 0.3491 | rad   |
+    | 2     | `PIP_flexion/angle`      | 0        | 1.833  | rad   |
+    | 3     | `DIP_flexion/angle`      | -0.08727 | 1.396  | rad   |
+    | 4-7   | `*/velocity`             | -inf     | inf    | rad/s |
+    | 8     | `FDP/tension`            | 0        | 25     | N     |
+    | 9     | `FDS/tension`            | 0        | 25     | N     |
+    | 10    | `EIP/tension`            | 0        | 7.056  | N     |
+    | 11    | `EDC/tension`            | 0        | 25     | N     |
+    | 12    | `LUM/tension`            | 0        | 6.48   | N     |
+    | 13    | `DI/tension`             | 0        | 25     | N     |
+    | 14    | `PI/tension`             | 0        | 25     | N     |
+    | 15-21 | `*/length`               | -inf     | inf    | m     |
+    | 22-28 | `*/command`              | -1       | 1      | 1     |
+    | 29-31 | `fingertip/x` to `z`     | -inf     | inf    | m     |
+    | 32-34 | `target/x` to `z`        | -inf     | inf    | m     |
+    | 35-37 | `target/dx` to `dz`      | -inf     | inf    | m     |
+    | 38-40 | `ahead_60ms/dx` to `dz`  | -inf     | inf    | m     |
+    | 41-43 | `ahead_120ms/dx` to `dz` | -inf     | inf    | m     |
+    | 44-46 | `ahead_200ms/dx` to `dz` | -inf     | inf    | m     |
 
     ## Reward
-    As in `Finger-v1`, with the moving point as target: 50 dt (0.5 / (1 + d / 0.020 m)
-    + 0.5 / (1 + d / 0.002 m)) minus effort and change.
+    As in `Finger-v1`, with the distance d of the true fingertip from the moving point, m, and
+    dt = 0.02 s; `reward` replaces the weights 50, 1 and 0 of `FingertipReward`:
+
+    ```text
+    reward_nearness =  50 dt (0.5 / (1 + d / 0.020 m) + 0.5 / (1 + d / 0.002 m))
+    reward_effort   =  -1 dt mean over the tendons of (tension / largest tension)²
+    reward_change   =  -0 dt mean over the tendons of (change of the command)²
+    ```
 
     ## Start
     At rest, with the fingertip at a random point of a closed path, or at the beginning of an open
@@ -176,7 +196,7 @@ class FingerTrackEnv(FingerEnv):
         path: A path of `shapechanger.finger.paths`; its name, "circle", "figure-eight", "line" or
             "curve", optionally with settings; a function of time; a CSV file of t, x, y and z; or
             "random" to draw a path at each reset.
-        **arguments: Arguments of `FingerEnv`.
+        **arguments: The common arguments above.
 
     Raises:
         PathError: If `path` is not a path, or the nominal finger cannot follow it.

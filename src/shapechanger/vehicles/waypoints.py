@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.pages import Page
 from shapechanger.contract.world import STANDING_MPS, STANDING_RADPS
 from shapechanger.errors import DemosError, ShapechangerError, SpaceMismatch, StudyError, WorldError
 from shapechanger.layout import Element, Feature, Layout
@@ -195,10 +196,26 @@ def _numbers(seen: Any) -> NDArray[np.float32]:
     return cast("Any", seen)["state"] if isinstance(seen, dict) else seen
 
 
-class WaypointView(gym.Env[Any, NDArray[np.float32]]):
+class WaypointView(Page, gym.Env[Any, NDArray[np.float32]]):
     """A vehicle, simulated or on the network, with rectified images and waypoints as actions.
 
     `response` is the vehicle's response to steering, or None before it was measured.
+
+    ## Action space
+    `Box(-1, 1, (2,), float32)`: the bearing of a point 0.8 m ahead, 1 for 1 rad to the right; and
+    the speed, 1 for full throttle and -1 for the least. An action lasts one control period, 1/20 s.
+
+    | Num | Action             | Min | Max | Unit |
+    | --- | ------------------ | --- | --- | ---- |
+    | 0   | `waypoint/bearing` | -1  | 1   | 1    |
+    | 1   | `waypoint/speed`   | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(0, 255, (48, 80, 3), uint8)`, the rectified frame, RGB:
+
+    | Num     | Observation        | Min | Max | Unit |
+    | ------- | ------------------ | --- | --- | ---- |
+    | 0-11519 | `camera/canonical` | 0   | 255 | 1    |
     """
 
     response: SteeringResponse | None

@@ -39,20 +39,37 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     """Env of a robot on the network, such as a car, a boat or a finger.
 
     ## Action space
-    One number for each action of the robot, in the order of `action_layout`: for vehicles
-    `[steering, throttle]` in [-1, 1], where -1 steers left and +1 drives forward. (In ROS positive
-    is left.) One-sided actions, such as tendons, are in [0, 1].
+    `Box(float32)`, one number for each action of the robot, in the order of `action_layout`.
+    One-sided actions, such as tendons, are in [0, 1]. For vehicles -1 steers left and +1 drives
+    forward. (In ROS positive is left.) For the profile `car`:
+
+    | Num | Action     | Min | Max | Unit |
+    | --- | ---------- | --- | --- | ---- |
+    | 0   | `steering` | -1  | 1   | 1    |
+    | 1   | `throttle` | -1  | 1   | 1    |
 
     ## Observation space
     The camera's image, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
-    `state=True` a Dict of `image` and `state`; the state alone for a robot without a camera.
-    `observation_layout` describes the numbers of the state.
+    `state=True` a Dict of `image` and `state`; the state alone for a robot without a camera. The
+    state is `float32`: the quantities that the robot's sensors measure, then the applied actions.
+    `observation_layout` describes it. For the profile `car`, which ships without sensors:
+
+    | Num | Observation        | Min | Max | Unit |
+    | --- | ------------------ | --- | --- | ---- |
+    | 0   | `steering/applied` | -1  | 1   | 1    |
+    | 1   | `throttle/applied` | -1  | 1   | 1    |
 
     ## Reward
-    The sum of `info["reward_terms"]`, each of which is also a key of `info` (see `DriveReward`):
-    metres forward, collisions, seconds stuck. `info["reward_sources"]` names the source of `speed`,
-    `collision` and `stall`: a sensor, "estimated" or "absent". Terms of absent quantities are left
-    out.
+    The sum of the terms of `DriveReward`, for the speed v along the heading, m/s, and the time dt
+    between two states, s. The profile sets the weights, 1, -10 and -1 by default; `reward` replaces
+    them. Terms of quantities that are not measured are left out. `info["reward_sources"]` names the
+    source of `speed`, `collision` and `stall`: a sensor, "estimated" or "absent".
+
+    ```text
+    reward_velocity  =   1 dt v
+    reward_collision = -10 if there is a new collision
+    reward_stall     =  -1 dt while the robot pushes without moving
+    ```
 
     ## Start
     `reset` takes control, waits until the robot is armed (see `on_reset`), and runs the profile's
@@ -74,7 +91,11 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     period late, 0 in lockstep; `armed`, `emergency`; `absent`: features of the state without
     a measurement, which have the middle of their range; `captured_ns` and `decided_ns`: capture
     time of the frame, and arrival time of the applied command, ns of the robot's clock;
-    `intervene_action`: command of a person who has control instead of the program.
+    `intervene_action`: command of a person who has control instead of the program; after a step
+    `reward_terms`, whose terms are also keys of `info`.
+
+    ## Versions
+    v1: the first.
 
     Args:
         robot: Name of a known robot, or its address, HOST or HOST:PORT.

@@ -19,6 +19,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.contract.drive_reward import DriveReward
+from shapechanger.contract.pages import Page
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import (
     ProfileError,
@@ -132,8 +133,27 @@ def _seed_of(kind: str, seed: Any) -> int:
     return check_seed(seed, WorldError, f"The seed of a {kind} must be", largest=None)
 
 
-class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
-    """The driving task: a vehicle on sampled courses, within its robot's limits."""
+class DriveEnv(Page, gym.Env[Any, NDArray[np.float32]], EzPickle):
+    """The driving task: a vehicle on sampled courses, within its robot's limits.
+
+    ## Action space
+    `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. An action lasts one control
+    period of the profile, 1/20 s.
+
+    | Num | Action     | Min | Max | Unit |
+    | --- | ---------- | --- | --- | ---- |
+    | 0   | `steering` | -1  | 1   | 1    |
+    | 1   | `throttle` | -1  | 1   | 1    |
+
+    ## Start
+    At a random place of a course that the seed draws, looking along it, at rest.
+
+    ## Info
+    `progress`, metres along the course since the start; `collisions` of any part of the vehicle
+    since the start, even if no bumper detects them; `pose`, (x, y, heading) in m and rad; `course`,
+    the seed of the course; `standing`, whether the vehicle neither moves nor turns; and after a
+    step `reward_terms`, whose terms are also keys of `info`.
+    """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
     parts: frozenset[str]  # Parts that the robot's outputs move, such as "wheels".

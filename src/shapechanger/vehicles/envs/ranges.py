@@ -148,18 +148,18 @@ class RangesEnv(DriveEnv):
     | 10  | `yaw_rate`     | -15 | 15  | rad/s |
 
     ## Reward
-    `DriveReward`, which counts metres of progress along the course, minus 3 for each collision by
-    default, and minus 1 for each second of standing. `reward_near` is 0 at clearances
-    of 0.35 m and more, and falls linearly to -3 per second at contact.
+    The sum of four terms, for the progress along the course p, m, the least distance in the
+    observation c, m, and dt = 0.05 s; `reward` replaces the weights 1, -3 and -1 of `DriveReward`:
 
-    ## Start
-    At a random place of a course that the seed draws, looking along it, at rest.
+    ```text
+    reward_velocity  =  1 p
+    reward_collision = -3 if there is a new collision
+    reward_stall     = -1 dt if abs(p) / dt < 0.1 m/s
+    reward_near      = -3 dt max(0, 1 - c / 0.35 m)
+    ```
 
     ## End
     Terminated by a collision, unless `put_back`. Truncated after 400 steps.
-
-    ## Info
-    As `VehicleEnv`: `progress`, `collisions`, `pose`, `course`, `standing`, `reward_terms`.
 
     ## Versions
     v1: the first.

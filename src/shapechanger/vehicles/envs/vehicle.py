@@ -36,26 +36,36 @@ class VehicleEnv(DriveEnv):
     emulates them, and reaches the same positions. `shapechanger/RemoteVehicle-v1` is the same task
     on hardware or on a twin.
 
-    ## Action space
-    `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. An action lasts one control
-    period of the profile, 1/20 s.
-
-    | Num | Action     | Min | Max | Unit |
-    | --- | ---------- | --- | --- | ---- |
-    | 0   | `steering` | -1  | 1   | 1    |
-    | 1   | `throttle` | -1  | 1   | 1    |
-
     ## Observation space
     The camera's frame, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
     `state=True` a Dict of `image` and `state`; with `image=False` the state alone.
-    `observation_layout` names the numbers of the state.
+    `observation_layout` describes them. The state is `float32`; a number without a sensor has the
+    middle of its range. For the profiles `lab-car`, `lab-tank`, `lab-boat` and `lab-truck`:
+
+    | Num | Observation        | Min  | Max | Unit  |
+    | --- | ------------------ | ---- | --- | ----- |
+    | 0   | `speed`            | -inf | inf | m/s   |
+    | 1   | `distance`         | 0    | inf | m     |
+    | 2   | `bump`             | 0    | 1   | 1     |
+    | 3   | `stall`            | 0    | 1   | 1     |
+    | 4   | `collision`        | 0    | 1   | 1     |
+    | 5   | `yaw_rate`         | -inf | inf | rad/s |
+    | 6   | `acceleration_x`   | -inf | inf | m/s²  |
+    | 7   | `acceleration_y`   | -inf | inf | m/s²  |
+    | 8   | `battery`          | 0    | inf | V     |
+    | 9   | `steering/applied` | -1   | 1   | 1     |
+    | 10  | `throttle/applied` | -1   | 1   | 1     |
 
     ## Reward
-    `DriveReward`: metres forward, minus collisions and seconds of being stuck, all measured by the
-    robot's own sensors. `info["reward_terms"]` has its terms, `info["reward_sources"]` the sensors.
+    The sum of the terms of `DriveReward`, for the speed v along the heading, m/s, and dt = 0.05 s;
+    `reward` replaces the weights 1, -10 and -1. The robot's own sensors measure all of them;
+    `info["reward_sources"]` names the sensors.
 
-    ## Start
-    At a random place of a course that the seed draws, looking along it, at rest.
+    ```text
+    reward_velocity  =   1 dt v
+    reward_collision = -10 if there is a new collision
+    reward_stall     =  -1 dt while the vehicle pushes without moving
+    ```
 
     ## End
     Terminated by a collision, which the bumper or a stall reveals, unless `put_back` is set or
@@ -66,7 +76,7 @@ class VehicleEnv(DriveEnv):
     since the start, even if no bumper detects them; `pose`, (x, y, heading) in m and rad; `course`,
     the seed of the course; `standing`, whether the vehicle neither moves nor turns. Keys shared
     with `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`, `armed`, `emergency`,
-    `absent`, `reward_terms`, `reward_sources`, `captured_ns`, `decided_ns`.
+    `absent`, `reward_terms` and its terms, `reward_sources`, `captured_ns`, `decided_ns`.
 
     ## Versions
     v1: the first.
@@ -238,29 +248,14 @@ class WaypointEnv(WaypointView, DriveEnv):
     Images are warped to one virtual camera (`shapechanger.vehicles.cameras.rectify`). Each vehicle
     converts waypoints to steering by its `SteeringResponse`, measured when the env is made.
 
-    ## Action space
-    `Box(-1, 1, (2,), float32)`: the bearing of a point 0.8 m ahead, 1 for 1 rad to the right; and
-    the speed, 1 for full throttle and -1 for the least. An action lasts one control period, 1/20 s.
-
-    | Num | Action             | Min | Max | Unit |
-    | --- | ------------------ | --- | --- | ---- |
-    | 0   | `waypoint/bearing` | -1  | 1   | 1    |
-    | 1   | `waypoint/speed`   | -1  | 1   | 1    |
-
-    ## Observation space
-    The rectified frame, RGB, `uint8`, shape (48, 80, 3).
-
     ## Reward
-    The terms of `RangesEnv`, or of `VehicleEnv` with `sensed`.
-
-    ## Start
-    At a random place of a course that the seed draws, looking along it, at rest.
+    The sum of the terms of `RangesEnv`: metres of progress along the course, -3 for each collision,
+    -1 dt while it stands, and `reward_near` = -3 dt max(0, 1 - clearance / 0.35 m), dt = 0.05 s.
+    With `sensed`, that of `VehicleEnv`: metres forward, -10 for each collision and -1 dt while it
+    pushes without moving, as its sensors measure them. `reward` replaces the weights.
 
     ## End
     Terminated by a collision, unless `put_back`. Truncated after 1,000 steps.
-
-    ## Info
-    The same keys as `RangesEnv`, or as `VehicleEnv` with `sensed`.
 
     ## Versions
     v1: the first.
@@ -270,10 +265,12 @@ class WaypointEnv(WaypointView, DriveEnv):
         robot: As in `VehicleEnv`.
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
             for a boat, so that only the bodies of vehicles differ.
-        sensed: Whether the robot is simulated as in `VehicleEnv`, and its sensors measure speed
-            and reward; otherwise speed and reward are the true ones, as in `RangesEnv`.
-        **task: `courses`, `randomise`, `put_back`, `lenses` and `render_mode` of `VehicleEnv`.
-            Warping ignores errors of the camera's pose, so with `randomise` images show them.
+        sensed: Whether the robot is simulated as in `VehicleEnv`, its sensors measure speed and
+            reward, and `info` has all keys of `VehicleEnv`; otherwise speed and reward are the true
+            ones, as in `RangesEnv`.
+        **task: `reward`, `courses`, `randomise`, `put_back`, `lenses` and `render_mode` of
+            `VehicleEnv`. Warping ignores errors of the camera's pose, so with `randomise` images
+            show them.
 
     Attributes:
         parts: The parts that the robot's outputs move.

@@ -24,18 +24,34 @@ class RemoteWaypointEnv(WaypointView):
     reflexes of the guard still act. Put the robot on free ground for the measurement. The env then
     waits again until the operator has put the robot at the start.
 
-    ## Action space and observation space
-    The same as in `WaypointEnv`.
+    ## Reward
+    That of `RemoteVehicleEnv`: metres forward, -10 for each collision, and -1 for each second in
+    which the robot pushes without moving, as far as they are measured; `reward` replaces the
+    weights.
 
-    ## Reward, start, end and info
-    The same as in `RemoteVehicleEnv`.
+    ## Start
+    After a measurement of the response, if one is needed, that of `RemoteVehicleEnv`: once the
+    operator has armed the robot, or its reset routine has run.
+
+    ## End
+    That of `RemoteVehicleEnv`: terminated by a collision, unless the reward is set otherwise;
+    truncated when the link is lost, at an emergency stop, when the robot is disarmed and when
+    another client takes control. `info["truncated_because"]` is the reason.
+
+    ## Info
+    The keys of `RemoteVehicleEnv`. `action_applied` has the steering and the throttle.
+
+    ## Versions
+    v1: the first.
 
     Args:
         robot: Name of a known robot, or its address, HOST or HOST:PORT.
         response: Turn for each metre, rad/m, and for each second, rad/s, at full steering, such as
             the attribute `response` of an earlier env; None to use the robot's profile or to
             measure the response in the first reset.
-        options: Further arguments of `RemoteVehicleEnv`, except `size`, `state` and `image`.
+        **options: `key`, `fingerprint`, `pace`, `reward`, `on_reset`, `on_waiting`,
+            `reset_timeout_s`, `timeout_s`, `interventions`, `role`, `name` and `render_mode` of
+            `RemoteVehicleEnv`.
 
     Attributes:
         response: Response of the vehicle to steering; None before it is given or measured.
