@@ -67,9 +67,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         if path not in pages:
             add(path, abs_src_path=str(ROOT / path))
         if path.endswith(".md"):
-            folder = posixpath.dirname(path)
             links = _LINK.findall((ROOT / path).read_text())
-            targets = {posixpath.normpath(posixpath.join(folder, link)) for link in links}
+            targets = {posixpath.normpath(posixpath.join(path, "..", link)) for link in links}
             found += [one for one in targets if one not in found and (ROOT / one).is_file()]
     sections: dict[str, list[str]] = {}
     for made in (environment_pages(), wiring_pages(), api_pages()):
@@ -102,17 +101,15 @@ def on_post_page(output: str, **_: Any) -> str:
 
 
 class FencedExamples(griffe.Extension):
-    """Put the examples of docstrings into fences; in Markdown `>>>` would quote them."""
+    """Show inherited sections of pages, and fence examples; in Markdown `>>>` would quote them."""
 
     def on_instance(self, *, obj: griffe.Object, **_: Any) -> None:
         """Rewrite the docstring of an object that Griffe has read."""
         if obj.docstring is not None:
             loaded: Any = getattr(sys.modules.get(obj.module.path), obj.name, None)
-            if isinstance(loaded, type) and issubclass(loaded, Page):
-                obj.docstring.value = cleandoc(loaded.__doc__ or "")  # With inherited sections.
-            obj.docstring.value = _EXAMPLE.sub(
-                lambda match: f"```pycon\n{match[0].rstrip()}\n```\n", obj.docstring.value
-            )
+            inherits = isinstance(loaded, type) and issubclass(loaded, Page)
+            text = cleandoc(loaded.__doc__ or "") if inherits else obj.docstring.value
+            obj.docstring.value = _EXAMPLE.sub(lambda m: f"```pycon\n{m[0].rstrip()}\n```\n", text)
 
 
 _MARK: Final = re.compile(r"^<!-- keys: (\w+) (\w+) -->$", re.MULTILINE)
@@ -178,10 +175,8 @@ def _messages(side: str) -> Iterator[str]:
 def _default(name: str, field: inspect.Field) -> str:
     """Return a default as a cell; empty for a required key."""
     value: Any = field.default
-    if value is None:
-        return "none"
-    if value is msgspec.NODEFAULT or value in ("", b"", ()):
-        return ""
+    if value in (None, msgspec.NODEFAULT, "", b"", ()):
+        return "none" if value is None else ""
     if name in ("address", "mux"):
         return hex(value)
     return f"{value:.9g}" if isinstance(value, float) else json.dumps(value)

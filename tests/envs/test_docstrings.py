@@ -23,19 +23,12 @@ IDS = (
     *("Finger", "FingerTrack", "OwnRobot"),
     *("RemoteFinger", "RemoteFingerTrack", "RemoteVehicle", "RemoteWaypoint"),
 )
-HEADINGS = (
-    *("## Action space", "## Observation space", "## Reward", "## Start", "## End", "## Info"),
-    *("Args:", "## Versions"),
-)
+HEADINGS = ("Action space", "Observation space", "Reward", "Start", "End", "Info", "Versions")
 OWN_BODIES = Path(__file__).parents[2] / "docs" / "own-bodies.md"
-# Arguments that an env sets itself, and those that it passes on to another one.
+# Arguments that an env sets itself, and those that it passes to the env of a robot.
 FIXED = {"self", "model_path", "observation_space", "has_camera", "coarse", "task"}
-OF_A_ROBOT = "key fingerprint on_reset on_waiting reset_timeout_s"
-PASSED_ON = {
-    "RemoteFinger": OF_A_ROBOT,
-    "RemoteFingerTrack": OF_A_ROBOT,
-    "RemoteWaypoint": f"{OF_A_ROBOT} pace reward timeout_s interventions role name render_mode",
-}
+OF_A_RIG = ("key", "fingerprint", "on_reset", "on_waiting", "reset_timeout_s")
+OF_WAYPOINTS = ("pace", "reward", "timeout_s", "interventions", "role", "name", "render_mode")
 
 
 @pytest.mark.parametrize("name", IDS)
@@ -45,7 +38,7 @@ def test_a_docstring_is_a_page_of_the_env(name: str, tmp_path: Path) -> None:
     env_class = getattr(importlib.import_module(module), class_name)
     page = inspect.getdoc(env_class) or ""
     words, steps = " ".join(page.split()), spec.max_episode_steps
-    needed = [*map(re.escape, HEADINGS), *arguments_of(name, env_class)]
+    needed = ["Args:", *(f"## {title} " for title in HEADINGS), *arguments_of(name, env_class)]
     needed += [f"runcated after {steps:,} steps"] if steps else []
     assert [one for one in needed if not re.search(one, words)] == []
     for title, layout in layouts_of_page(name, tmp_path).items():
@@ -70,39 +63,25 @@ def layouts_of_page(name: str, folder: Path) -> dict[str, Layout]:
 
 
 def arguments_of(name: str, env_class: type[Any]) -> list[str]:
-    """Return a pattern per argument: a name in backticks, or a key of Args.
-
-    The default follows a name of Gymnasium's.
-    """
-    found = dict.fromkeys(PASSED_ON.get(name, "").split(), "")
+    """Return a pattern per argument: a key of Args, or a name, Gymnasium's with its default."""
+    found = dict.fromkeys(OF_A_RIG if name in ("RemoteFinger", "RemoteFingerTrack") else ())
+    if name == "RemoteWaypoint":
+        found = dict.fromkeys(OF_A_RIG + OF_WAYPOINTS)
     if issubclass(env_class, Reshapable):
-        found = {"default_camera_config": "", "shadows": "(None)", "fast_model": "(True)"}
-        found |= {"towards": "(None)"}
+        found = {"default_camera_config": None, "shadows": "None", "fast_model": "True"}
+        found |= {"towards": "None"}
+    fixed = {*FIXED, *(("parameters", "gap") if name.startswith("RemoteFinger") else ())}
     for base in env_class.__mro__:
         is_gymnasiums = base.__module__.startswith("gymnasium.envs")
         if "__init__" in vars(base) and (is_gymnasiums or base.__module__.startswith("shapech")):
             for one in inspect.signature(base.__init__).parameters.values():
-                if one.kind is not one.VAR_KEYWORD and one.name not in FIXED:
-                    found.setdefault(one.name, shown(one.default) if is_gymnasiums else "")
-    of_a_simulation = {"parameters", "gap"} if name.startswith("RemoteFinger") else set[str]()
+                if one.kind is not one.VAR_KEYWORD and one.name not in fixed:
+                    default = re.sub(r"\.0\b", "", repr(one.default).replace("'", '"'))
+                    found.setdefault(one.name, default if is_gymnasiums else None)
     return [
-        f"`{one}` {re.escape(default)}" if default else f"`{one}`| {one}: "
+        rf"`{one}` \(?{re.escape(default)}\)" if default else f"`{one}`| {one}: "
         for one, default in found.items()
-        if one not in of_a_simulation
     ]
-
-
-def shown(value: Any) -> str:
-    """Return a default as a page shows it."""
-    texts = [
-        f"{one:g}"
-        if type(one) in (int, float)
-        else f'"{one}"'
-        if isinstance(one, str)
-        else f"{one}"
-        for one in (value if isinstance(value, tuple) else [value])
-    ]
-    return f"({', '.join(texts)})"
 
 
 def layout_rows(layout: Layout, title: str) -> list[tuple[str, ...]]:
@@ -115,20 +94,17 @@ def layout_rows(layout: Layout, title: str) -> list[tuple[str, ...]]:
         for few in [features] if is_block else [[feature] for feature in features]:
             size = sum(feature.size for feature in few)
             place = str(first) if size == 1 else f"{first}-{first + size - 1}"
-            name, _, axis = few[-1].name.rpartition("/")
-            suffix = "/*" if name.count("/") else ""
-            block = f"`{few[0].name}` to `{axis}`" if "/" in kind else f"`*/{kind}{suffix}`"
-            name = block if is_block else f"`{few[0].name}`"
+            of_body, _, axis = few[-1].name.rpartition("/")
+            name = f"`*/{kind}{'/*' if '/' in of_body else ''}`"
+            if not is_block or "/" in kind:
+                name = f"`{few[0].name}`" + (f" to `{axis}`" if is_block else "")
             rows.append((place, name, low, high, ", ".join(dict.fromkeys(f.unit for f in few))))
             first += size
     return rows
 
 
 def _kind_of(feature: Feature) -> tuple[str, str, str, str]:
-    """Return the name without the element, the bounds and the unit; the units of a block differ.
-
-    Axes, such as `torso/vx`, keep the element.
-    """
+    """Return the name, only axes with their element, bounds and unit; units of a block differ."""
     element, _, kind = feature.name.partition("/")
     kind, _, part = kind.partition("/")
     unit = "" if part else feature.unit

@@ -163,37 +163,27 @@ def test_an_episode_starts_at_rest_with_any_delay(actions: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "error", "sentence"),
+    ("arguments", "options", "error", "sentence"),
     [
-        ({"path": "circle"}, UnknownName, "There are: posture, target"),
-        ({"posture": [0.0, 0.0]}, FingerError, "four angles in rad, MCP_flexion, .*; got"),
-        ({"posture": [2.0, 0.0, 0.0, 0.0]}, FingerError, r"within \[-0.349.* and \[1.571"),
-        ({"target": [0.1, np.nan, 0.0]}, FingerError, "three finite numbers, m"),
+        ({"actions": "tensions"}, {}, UnknownName, "'tensions'. Did you mean 'tension'"),
+        ({"gap": "wide", "parameters": NOMINAL}, {}, FingerError, "Give either parameters or a"),
+        ({"finger_seed": 2}, {}, FingerError, "give a gap too"),
+        ({"parameters": {"fricton": 1.0}}, {}, UnknownName, "No parameter of .*'fricton'"),
+        ({"parameters": "{}x"}, {}, FingerError, "Invalid finger parameters"),
+        ({"reward": {"effrt": 1.0}}, {}, UnknownName, "'effrt'. Did you mean 'effort'"),
+        ({}, {"path": "circle"}, UnknownName, "There are: posture, target"),
+        ({}, {"posture": [0.0, 0.0]}, FingerError, "four angles in rad, MCP_flexion, .*; got"),
+        ({}, {"posture": [2.0, 0.0, 0.0, 0.0]}, FingerError, r"within \[-0.349.* and \[1.571"),
+        ({}, {"target": [0.1, np.nan, 0.0]}, FingerError, "three finite numbers, m"),
     ],
 )
-def test_invalid_options_are_refused(
-    options: dict[str, Any], error: type[Exception], sentence: str
+def test_invalid_arguments_and_options_are_refused(
+    arguments: dict[str, Any], options: dict[str, Any], error: type[Exception], sentence: str
 ) -> None:
+    """Arguments are refused when the env is made, options at a reset."""
+    env = FingerReachEnv() if options else None
     with pytest.raises(error, match=sentence):
-        FingerReachEnv().reset(seed=0, options=options)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error", "sentence"),
-    [
-        ({"actions": "tensions"}, UnknownName, "'tensions'. Did you mean 'tension'"),
-        ({"gap": "wide", "parameters": NOMINAL}, FingerError, "Give either parameters or a gap"),
-        ({"finger_seed": 2}, FingerError, "give a gap too"),
-        ({"parameters": {"fricton": 1.0}}, UnknownName, "No parameter of a finger .*'fricton'"),
-        ({"parameters": "{}x"}, FingerError, "Invalid finger parameters"),
-        ({"reward": {"effrt": 1.0}}, UnknownName, "'effrt'. Did you mean 'effort'"),
-    ],
-)
-def test_invalid_arguments_are_refused(
-    arguments: dict[str, Any], error: type[Exception], sentence: str
-) -> None:
-    with pytest.raises(error, match=sentence):
-        FingerReachEnv(**arguments)
+        env.reset(seed=0, options=options) if env else FingerReachEnv(**arguments)
 
 
 # Steps until the target is reached: 1.2 s of an episode of 2 s.

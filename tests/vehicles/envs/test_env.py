@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -146,13 +146,18 @@ def test_a_blocked_start_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         ("car", {"courses": None}, WorldError, "The seed of a course must be .*, got None"),
         ("car", {"render_mode": "human"}, UnknownName, "No render mode matches 'human'"),
         ("car", {"size": (0, 0)}, SpaceMismatch, r"each 1 to 1920 pixels, got \(0, 0\)"),
+        ("car", {"options": {"curse": 1}}, UnknownName, "'curse'. Did you mean 'course'"),
+        ("car", {"options": {"course": "a"}}, WorldError, "course must be a whole .*, got 'a'"),
+        ("car", {"options": {"start": -1}}, WorldError, "start must be a whole .* 0, got -1"),
     ],
 )
-def test_invalid_arguments_are_refused(
-    vehicle: str, arguments: Mapping[str, Any], kind: type[ShapechangerError], sentence: str
+def test_invalid_arguments_and_options_are_refused(
+    vehicle: str, arguments: dict[str, Any], kind: type[ShapechangerError], sentence: str
 ) -> None:
+    options = arguments.get("options")  # Of a reset.
+    env = VehicleEnv(vehicle, image=False) if options else None
     with pytest.raises(kind, match=sentence):
-        VehicleEnv(vehicle, image=False, **arguments)
+        env.reset(options=options) if env else VehicleEnv(vehicle, image=False, **arguments)
 
 
 @pytest.mark.gl
@@ -229,22 +234,6 @@ def test_options_do_not_change_other_draws() -> None:
         assert other[:2] == (course + 1, look)
         env.reset()
         assert env.world.look != look
-
-
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"curse": 1}, "No option of reset matches 'curse'. Did you mean 'course'"),
-        ({"course": "a"}, "The seed of a course must be a whole number from 0, got 'a'"),
-        ({"start": -1}, "The seed of a start must be a whole number from 0, got -1"),
-    ],
-)
-def test_invalid_options_are_refused(options: dict[str, Any], sentence: str) -> None:
-    with (
-        closing(RangesEnv("car", courses=(0,))) as env,
-        pytest.raises((UnknownName, WorldError), match=sentence),
-    ):
-        env.reset(options=options)
 
 
 @pytest.mark.parametrize("vehicle", HOME)
