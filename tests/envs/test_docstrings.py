@@ -64,11 +64,11 @@ def layouts_of_page(name: str, folder: Path) -> dict[str, Layout]:
 
 def arguments_of(name: str, env_class: type[Any]) -> list[str]:
     """Return a pattern per argument: a key of Args, or a name, Gymnasium's with its default."""
-    found = dict.fromkeys(OF_A_RIG if name in ("RemoteFinger", "RemoteFingerTrack") else ())
+    found = dict.fromkeys(OF_A_RIG if name.startswith("RemoteFinger") else (), "")
     if name == "RemoteWaypoint":
-        found = dict.fromkeys(OF_A_RIG + OF_WAYPOINTS)
+        found = dict.fromkeys(OF_A_RIG + OF_WAYPOINTS, "")
     if issubclass(env_class, Reshapable):
-        found = {"default_camera_config": None, "shadows": "None", "fast_model": "True"}
+        found = {"default_camera_config": "", "shadows": "None", "fast_model": "True"}
         found |= {"towards": "None"}
     fixed = {*FIXED, *(("parameters", "gap") if name.startswith("RemoteFinger") else ())}
     for base in env_class.__mro__:
@@ -76,10 +76,10 @@ def arguments_of(name: str, env_class: type[Any]) -> list[str]:
         if "__init__" in vars(base) and (is_gymnasiums or base.__module__.startswith("shapech")):
             for one in inspect.signature(base.__init__).parameters.values():
                 if one.kind is not one.VAR_KEYWORD and one.name not in fixed:
-                    default = re.sub(r"\.0\b", "", repr(one.default).replace("'", '"'))
-                    found.setdefault(one.name, default if is_gymnasiums else None)
+                    default = re.sub(r"\.0\b", "", repr(one.default).strip("()").replace("'", '"'))
+                    found.setdefault(one.name, default if is_gymnasiums else "")
     return [
-        rf"`{one}` \(?{re.escape(default)}\)" if default else f"`{one}`| {one}: "
+        rf"`{one}` \({re.escape(default)}\)" if default else f"`{one}`| {one}: "
         for one, default in found.items()
     ]
 
