@@ -8,7 +8,7 @@ export PYTHONDONTWRITEBYTECODE :=
 PYTHON ?= python3
 JOBS ?= 2
 
-# Tests of whole programs spend half of their time waiting for these.
+# Tests of whole programs spend half of their time waiting for the programs, so one more runs at once.
 SYSTEM_JOBS ?= $(shell expr $(JOBS) + 1)
 
 VENV := .venv
@@ -28,7 +28,7 @@ COVERING := tests/contract/test_drive_reward.py tests/envs/stepping tests/envs/t
 	tests/robot/profile tests/test_architecture.py tests/test_errors.py tests/test_layout.py \
 	tests/transfer/body_map tests/transfer/metrics
 
-# Written after a successful installation: for the demo, and for everything else.
+# Written after a successful installation: of `all` for the demo, and of `all` and `dev` for the tests.
 INSTALLED_ALL := $(VENV)/.installed-all
 INSTALLED_DEV := $(VENV)/.installed-dev
 STUBS := typings/mujoco/.generated
@@ -40,7 +40,7 @@ VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	"Shapechanger needs Python 3.11 or newer, and %s is %d.%d: " % (sys.executable, v[0], v[1]) \
 	+ "name a newer one, as in `make PYTHON=python3.12 test`.")
 
-# uv takes a third of pip's time. It does not read pip's settings, so it is told of its indexes.
+# uv takes a third of pip's time. It does not read pip's settings, so pip's indexes are passed to it.
 PIP_TO_UV := s/^[^.]+\.find-links=/export UV_FIND_LINKS=/p; s/^[^.]+\.index-url=/export UV_DEFAULT_INDEX=/p; \
 	s/^[^.]+\.extra-index-url=/export UV_INDEX=/p
 INSTALL = $(RUN) -m pip install --quiet -c constraints.txt uv && \

@@ -45,7 +45,7 @@ backward = 24
 mix = { throttle = 1.0, steering = -1.0 }
 
 [limits]
-deadline_ms = 300       # Without a newer command, the robot stops.
+deadline_ms = 300       # After this time without a new command, the robot stops.
 arming = "anyone"       # A program may arm the robot; by default only a person may.
 """
 

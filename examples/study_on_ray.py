@@ -1,7 +1,7 @@
 # /// script
 # dependencies = ["shapechanger[sim,learn,report,cli,ray]"]
 # ///
-"""A transfer study on a Ray cluster: from the pole of the paper to one twice as long.
+"""A transfer study on a Ray cluster: from a pole to one twice as long.
 
 Without an address, Ray starts on this machine for the time of the study. On a cluster, all nodes
 must share the folder of the study.

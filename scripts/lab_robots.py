@@ -1,4 +1,4 @@
-"""Copy the numbers of the lab's robots from their profiles to the envs that simulate them.
+"""Copy the names, numbers and layouts of the lab's robots from their profiles to their envs.
 
 Run it after a change of `lab-*.toml`; a test compares the two.
 """

@@ -143,7 +143,7 @@ def _profile_table(name: str) -> Iterator[str]:
 
 
 def _keys(kinds: Iterable[type], options: Mapping[str, Iterable[str]]) -> str:
-    """Return a table of the keys of some types; `options` has the values of keys of chips."""
+    """Return a table of the keys of some types; `options` has the values of keys for chips."""
     rows: list[tuple[str, ...]] = []
     for kind in kinds:
         meanings = _documented(kind)[1]

@@ -74,7 +74,7 @@ def environment_pages() -> Pages:
 
 
 def _environment(env_id: str) -> tuple[str, bytes | None]:
-    """Return the page of an env, and a JPEG of its start; None if this machine cannot render."""
+    """Return the page of an env, and a JPEG of its start; None if there is no image."""
     short, spec, picture = _short(env_id), gym.registry[env_id], None
     module, _, name = cast("str", spec.entry_point).partition(":")
     # Other envs need a robot or a file.
@@ -225,8 +225,8 @@ def api_pages() -> Pages:
         rows.append((page, f"[`{page}`]({page}.md)", summary))
     pages["api/index.md"] = _page(
         "# API reference",
-        "Every name that a package exports, with shapes, units and errors. The names of "
-        "`shapechanger` itself are imported on first use.",
+        "The public names of these packages and modules, with shapes, units and errors. The names "
+        "of `shapechanger` itself are imported on first use.",
         table(("package", "contents"), [row[1:] for row in sorted(rows)]),
     )
     return pages

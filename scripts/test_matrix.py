@@ -1,6 +1,6 @@
 """Run the fast tests against other versions and installations: `make test-matrix`.
 
-Each lane has its own virtual environment under `build/matrix`:
+Each lane has its own virtual environment, under `build/matrix` except for the lane `robot`:
 
 - oldest: the lowest allowed version of every direct dependency;
 - newest: the newest allowed versions, without constraints.txt;

@@ -40,7 +40,7 @@ class Person:
         self._thread: threading.Thread | None = None
 
     def drive(self, values: Sequence[float]) -> None:
-        """Take control, also from a program, and hold the stick."""
+        """Take control once another client has it, and hold the stick in a thread."""
         self._let_go.clear()
         self._thread = threading.Thread(target=self._hold, args=(tuple(values),))
         self._thread.start()

@@ -14,7 +14,7 @@ class StickConfig(TeleoperatorConfig):
     """Configuration of the stick.
 
     Attributes:
-        throttle: How far ahead it points.
+        throttle: Throttle of each action, 0 to 1.
     """
 
     throttle: float = 0.3
@@ -43,7 +43,7 @@ class Stick(Teleoperator):
         """Do nothing."""
 
     def get_action(self) -> dict[str, float]:
-        """Return the direction ahead."""
+        """Return the action: straight ahead with this throttle."""
         return {"steering": 0.0, "throttle": self.config.throttle}
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:

@@ -29,7 +29,7 @@ PROGRAMS = Path(sys.executable).parent
 
 @pytest.fixture
 def at_the_wheel(person: Any) -> Any:
-    """A person who drives from the start."""
+    """A person who takes control as soon as LeRobot has it, and drives."""
     person.drive(AHEAD)
     return person
 
@@ -173,7 +173,9 @@ def test_an_unplugged_robot_costs_one_episode(
         play_sounds=False,
     )
     with served() as robot:
-        _kill_at_action(25, robot, monkeypatch)  # In the second episode: one has 20 at most.
+        _kill_at_action(
+            25, robot, monkeypatch
+        )  # In the second episode, as one has 20 actions at most.
         with pytest.raises(LinkError) as lost:
             record(config)
     _assert_is_a_sentence(lost.value)
