@@ -78,7 +78,7 @@ def test_exported_names_exist_once(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_imports_inside_functions_are_few_and_have_reasons() -> None:
-    """Each has a comment, on its line or above it, that says why it is not at the top."""
+    """An import of our own modules has a comment, on its line or above it, with the reason."""
     found = 0
     for path in _MODULES.values():
         text = path.read_text()
@@ -94,7 +94,7 @@ def test_imports_inside_functions_are_few_and_have_reasons() -> None:
 
 
 def test_the_picture_of_the_architecture_shows_the_imports() -> None:
-    """Except those of `cli`, which imports everything, and of the files that all import."""
+    """It omits the imports of `cli`, which imports all, and of the files that all may import."""
     apart = {"cli", "contract", "errors", "files", "identity", "layout", "registry"}
     found: set[tuple[str, str]] = set()
     for path in _SRC.rglob("shapechanger/*/**/*.py"):
@@ -109,8 +109,8 @@ def test_the_picture_of_the_architecture_shows_the_imports() -> None:
     }
 
 
-def test_no_program_is_started_from_the_command_line_package() -> None:
-    """No string names a module of `cli`, which `lint-imports` would not see."""
+def test_no_string_outside_cli_names_its_modules() -> None:
+    """`lint-imports` would not see that a program is started by the name of a module of `cli`."""
     found = [
         f"{module}: {node.value!r}"
         for module, path in _MODULES.items()

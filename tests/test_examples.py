@@ -1,6 +1,6 @@
 """The examples run, from another folder and with tiny budgets.
 
-Each example is one file of less than 100 lines that takes `--steps N`; the notebook has cells.
+Each script has fewer than 100 lines and takes `--steps N`; the cells of the notebook run in turn.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _OUTPUTS = {
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize("example", _EXAMPLES, ids=lambda example: example.stem)
 def test_an_example_runs(example: Path, tmp_path: Path) -> None:
-    """An example runs in an empty folder, without warnings of Shapechanger."""
+    """An example runs in an empty folder, and prints the expected parts."""
     run = subprocess.run(
         [sys.executable, str(example), *_ARGUMENTS.get(example.stem, _FEW)],
         check=False,
@@ -52,7 +52,7 @@ def test_an_example_runs(example: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("example", _EXAMPLES, ids=lambda example: example.stem)
 def test_an_example_is_short(example: Path) -> None:
-    """The first sentence describes the example, which has less than 100 lines."""
+    """An example has a docstring and fewer than 100 lines."""
     text = example.read_text()
     assert text.count("\n") < 100
     assert '\n"""' in text

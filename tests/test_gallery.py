@@ -18,7 +18,7 @@ GALLERY = PICTURES.parent / "gallery.md"
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_the_command_draws_one_clip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`--only` draws one clip into the given folder: four pendulums, in the order of their size."""
+    """`--only` draws one clip into the given folder: four pendulums, three in order of size."""
     monkeypatch.setattr(
         sys, "argv", ["draw_pictures.py", "--only", "balancing", "--out", str(tmp_path)]
     )
@@ -34,7 +34,7 @@ def test_the_command_draws_one_clip(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_the_gallery_shows_what_the_command_draws() -> None:
-    """Each clip is on the page; all together stay below 6 MB."""
+    """Each clip is on the page, and all pictures of the documentation stay below 6 MB."""
     assert sum(path.stat().st_size for path in PICTURES.iterdir()) < 6e6
     page = GALLERY.read_text()
     assert [name for name in CLIPS if f"(pictures/{name}.webm)" not in page] == []

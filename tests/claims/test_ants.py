@@ -206,8 +206,8 @@ def test_a_flipped_ant_is_unhealthy_at_once(ant: Any) -> None:
         assert info["reward_survive"] == 0.0
 
 
-def test_a_flipped_ant_rests_as_low_as_one_that_lies_down(ant: Any) -> None:
-    """Both rest at 0.27 m, so the height cannot distinguish them."""
+def test_a_flipped_ant_rests_at_27_centimetres(ant: Any) -> None:
+    """An ant that lies down is hardly higher, so the height cannot distinguish the two."""
     _place(ant, 0.5, _FLIPPED)
     for _ in range(200):
         ant.step(np.zeros(ant.model.nu))
@@ -233,7 +233,7 @@ def test_up_is_the_cosine_of_the_lean(ant: Any, lean_deg: float) -> None:
 
 
 def test_a_thrown_ant_is_unhealthy(ant: Any) -> None:
-    """The upper limit is 1.9 times the standing height."""
+    """For the ants of the catalogue, the upper limit is 1.9 times the standing height."""
     for factor, healthy in ((1.89, True), (1.91, False)):
         _place(ant, factor * ant.standing_height)
         assert ant.is_healthy == healthy

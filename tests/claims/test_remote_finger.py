@@ -113,7 +113,7 @@ def test_an_env_with_its_own_twin_is_rewarded_by_the_truth() -> None:
 
 
 def test_ten_seconds_identify_the_finger() -> None:
-    """Identified moment arms are off by less than 5 %, the nominal ones by more than 15 %."""
+    """Identified arms above 2 mm are off by less than 5 %, a nominal arm by more than 15 %."""
     with gym.make("shapechanger/Finger-v1", gap="real-like", finger_seed=0) as simulated:
         truth: FingerParameters = simulated.get_wrapper_attr("parameters")
     with gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=0) as rig:
@@ -131,7 +131,7 @@ def test_ten_seconds_identify_the_finger() -> None:
 
 
 def test_a_path_is_followed_on_its_own_twin() -> None:
-    """Layouts, start and target equal `FingerTrack-v1`'s, and the reward uses true values."""
+    """Layout and target equal `FingerTrack-v1`'s, the start nearly; the reward uses true values."""
     path = {"kind": "circle", "radius": 0.012, "hz": 0.5}
     policy = load_policy(POLICIES["track"])
     errors: list[float] = []

@@ -1,4 +1,4 @@
-"""No robot code reads the wall clock, which can jump."""
+"""Robot code reads the wall clock, which can jump, for calendar dates only."""
 
 import ast
 from pathlib import Path

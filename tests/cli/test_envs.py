@@ -17,12 +17,12 @@ from tests.cli.running import Cli
 from tests.envs.own_robots import DOG
 
 
-def test_list_names_every_env(cli: Cli) -> None:
+def test_without_an_env_all_bodies_and_vehicles_are_listed(cli: Cli) -> None:
     text = cli.output("envs")
     assert all(env_id in text for env_id in (*CATALOGUE, *VEHICLE_ENVS))
 
 
-def test_show_prints_the_layout_as_a_table(cli: Cli) -> None:
+def test_an_env_is_shown_with_its_layout_as_a_table(cli: Cli) -> None:
     text = cli.output("envs", "BigInvertedPendulum")
     for word in ("hinge/velocity", "rad/s", "-1.571", "joint slider", "100 N", "slide/motor"):
         assert word in text
@@ -30,7 +30,7 @@ def test_show_prints_the_layout_as_a_table(cli: Cli) -> None:
     assert "standing height: 0.9467 m" in text
 
 
-def test_compare_prints_the_certificate(cli: Cli) -> None:
+def test_two_envs_are_compared_by_their_certificate(cli: Cli) -> None:
     text = cli.output("envs", "Ant", "AmputatedAnt")
     assert "shank_4: length 0.5657 m -> 0.1414 m (x0.25)" in text
 
@@ -40,7 +40,7 @@ def test_check_lists_each_promise(cli: Cli) -> None:
 
 
 @pytest.mark.gl
-def test_render_writes_an_image(cli: Cli, tmp_path: Path) -> None:
+def test_picture_writes_an_image(cli: Cli, tmp_path: Path) -> None:
     out = tmp_path / "new" / "ant.png"
     cli.output("envs", "Ant", "--picture", str(out), "--width", "160", "--height", "120")
     assert iio.imread(out).shape == (120, 160, 3)

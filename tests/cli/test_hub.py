@@ -160,7 +160,7 @@ def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: 
     assert names == {second.name}
 
 
-def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
+def test_refusals_give_one_sentence(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     out = tmp_path / "out.safetensors"
     pull = ("hub", "pull", "ada/none", "--out", out)
     push = ("hub", "push", POLICY, "ada/new")
@@ -216,7 +216,7 @@ STEPS, EVIL = episodes("one/steps.jsonl"), episodes("../../evil")
         ("out", {}, listing(STEPS, DEMOS), "has other files than its shapechanger.json names"),
     ],
 )
-def test_files_that_are_refused(
+def test_repositories_with_unexpected_files_are_refused(
     run: Run,
     hub: FakeHub,
     tmp_path: Path,

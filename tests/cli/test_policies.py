@@ -1,4 +1,4 @@
-"""`shapechanger policies`: show, list, convert, evaluate, play and export."""
+"""`shapechanger policies`: show, convert, evaluate and export; and `play` with clones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`shapechanger demos`: edit, share, replay and record recordings, and learn from them."""
+"""`shapechanger demos`: record, show, edit, exchange and replay episodes, and learn from them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def episodes(data: Path) -> list[Path]:
     return sorted(path for path in data.iterdir() if path.is_dir())
 
 
-def test_list(data: Path, demos: Cli) -> None:
+def test_show_prints_a_line_per_episode(data: Path, demos: Cli) -> None:
     first, second = episodes(data)
     with (second / "steps.jsonl").open("ab") as file:
         file.write(b"torn")
@@ -72,7 +72,7 @@ def test_list(data: Path, demos: Cli) -> None:
     assert "2 episodes: 30 of 30 steps count" in printed
 
 
-def test_show_as_text(data: Path, demos: Cli) -> None:
+def test_show_prints_statistics(data: Path, demos: Cli) -> None:
     printed = demos.output("show", data)
     assert "driven by policy 50 %, expert 50 %" in printed
     assert "steering: 0.1 to 0.1, median 0.1" in printed
@@ -80,7 +80,7 @@ def test_show_as_text(data: Path, demos: Cli) -> None:
     assert "ended by: time 2" in printed
 
 
-def test_show_as_a_page(data: Path, tmp_path: Path, demos: Cli) -> None:
+def test_show_writes_a_self_contained_page(data: Path, tmp_path: Path, demos: Cli) -> None:
     first, second = episodes(data)
     demos.output("edit", "bad", first, "--from", 10, "--to", 19)
     damaged = second / "frames" / "000003.jpg"
@@ -98,7 +98,7 @@ def test_show_as_a_page(data: Path, tmp_path: Path, demos: Cli) -> None:
     assert "20 of 30" in text
 
 
-def test_cut_bad_good_mark(data: Path, demos: Cli) -> None:
+def test_edit_drops_restores_and_marks_steps(data: Path, demos: Cli) -> None:
     first, _ = episodes(data)
     assert "11 of 30 steps" in demos.output("edit", "cut", first, "--from", 5, "--to", 15)
     assert [s.index for s in read_episode(first).kept] == list(range(5, 16))
@@ -110,7 +110,7 @@ def test_cut_bad_good_mark(data: Path, demos: Cli) -> None:
     assert [(mark.step, mark.text) for mark in read_episode(first).marks][1:] == [(4, "a stone")]
 
 
-def test_merge(data: Path, tmp_path: Path, demos: Cli) -> None:
+def test_merge_copies_each_episode_once(data: Path, tmp_path: Path, demos: Cli) -> None:
     """Different layouts are reported; duplicates are refused."""
     other = header(state_layout=Layout(()))
     with EpisodeWriter.create(tmp_path / "other", other, spare_bytes=0) as writer:
@@ -122,7 +122,7 @@ def test_merge(data: Path, tmp_path: Path, demos: Cli) -> None:
     assert "the same episode" in demos.refused("merge", data, "--out", out)
 
 
-def test_repair(data: Path, demos: Cli) -> None:
+def test_repair_keeps_complete_steps(data: Path, demos: Cli) -> None:
     first, second = episodes(data)
     with (first / "steps.jsonl").open("ab") as file:
         file.write(b'{"kind":"step","st')

@@ -379,7 +379,7 @@ def test_a_hostile_recording_is_refused(
     words: str,
     command: tuple[str, ...],
 ) -> None:
-    """The error is one sentence, and no file is written; `list` prints no traceback."""
+    """The error is one sentence, and no file is written; `show` prints no traceback."""
     (tmp_path / "secret.jpg").write_text("secret")
     folder = tmp_path / "data-v0"
     spoil(make(folder))

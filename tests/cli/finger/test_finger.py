@@ -1,4 +1,4 @@
-"""`shapechanger finger`: recording a log, and identifying a finger."""
+"""`shapechanger finger`: record a log, identify a finger from it, and export a finger."""
 
 from __future__ import annotations
 

@@ -177,7 +177,7 @@ def test_an_episode_with_other_steps_is_not_overwritten(
 def test_damaged_episodes_are_not_fetched(
     there: Path, robot: RobotClient, tmp_path: Path, damage: str
 ) -> None:
-    """Data fetched so far are kept until the episode is repaired."""
+    """The fetch fails, and its incomplete copy does not count as an episode."""
     episode = record(there, 9)
     frame = episode / "frames" / "000003.jpg"
     if damage == "line":
