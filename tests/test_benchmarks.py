@@ -63,7 +63,7 @@ def test_a_wrong_name_in_only_has_a_suggestion(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.filterwarnings("ignore:Values in x were outside:RuntimeWarning")  # SciPy 1.15.
 def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
-    """A weak finger with friction can be held in this posture, but not brought there from rest."""
+    """In a hook, the knuckle is straight above a bent finger: it is held, but not reached."""
     hook = fingertip(np.radians([0.0, 0.0, 85.0, 55.0]))
     tensions = {
         share: tuple(share * most for most in NOMINAL.most_tension) for share in (0.4, 0.56)
