@@ -6,8 +6,9 @@
     python examples/simulation_and_robot.py                        # the simulated car
     python examples/simulation_and_robot.py --robot my-car         # a real car, or its twin
 
-`shapechanger robot serve my-car.toml --twin --arm-by-program` serves a twin. If only a person may
-arm the robot, run `shapechanger robot drive my-car` in another terminal, and press E, then P.
+`shapechanger robot serve my-car.toml --twin` serves a twin, which programs may arm. If only a
+person may arm the robot, run `shapechanger robot drive my-car` in another terminal, and press P
+while the program waits.
 """
 
 import gymnasium as gym
