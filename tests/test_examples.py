@@ -26,7 +26,7 @@ _OUTPUTS = {
     "two_bodies": ("hinge/angle      rad", "pole: length 0.6 m -> 1.2 m (x2)", "pole of 1.20 m: "),
     "simulation_and_robot": ("in 64 steps, 0 collisions",),
     "new_vehicle": ("steering  1.0, throttle 0.0: tracks  1.00 and -1.00", "driven 2."),
-    "new_method": ("Transfer ",),
+    "new_method": ("4,096 target steps",),
     "study_on_ray": ("fine-tune-1 has ended", "report.html"),
 }
 
