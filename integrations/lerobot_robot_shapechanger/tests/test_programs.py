@@ -173,9 +173,7 @@ def test_an_unplugged_robot_costs_one_episode(
         play_sounds=False,
     )
     with served() as robot:
-        _kill_at_action(
-            25, robot, monkeypatch
-        )  # In the second episode, as one has 20 actions at most.
+        _kill_at_action(25, robot, monkeypatch)  # In the second episode: one has 20 at most.
         with pytest.raises(LinkError) as lost:
             record(config)
     _assert_is_a_sentence(lost.value)
