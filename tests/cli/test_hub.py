@@ -136,6 +136,8 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
     pinned = ("--out", tmp_path / "folder" / "pinned.safetensors", "--revision", first)
     assert first in run("hub", "pull", "ada/reach", *pinned)[1]
     assert "exists already" in refused(run("hub", "pull", "ada/reach", "--out", out))
+    for arguments in (("push", "a.onnx", "ada/reach"), ("pull", "ada/reach", "--out", "a.onnx")):
+        assert "would be ONNX" in refused(run("hub", *arguments))
 
 
 def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path) -> None:

@@ -38,6 +38,7 @@ class HubPush:
     """Make a new repository public; it is private if not given."""
 
     def run(self) -> None:
+        _refuse_onnx(self.path)
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             if self.path.suffix in POLICY_FILES:
@@ -69,6 +70,7 @@ class HubPull:
     def run(self) -> None:
         if not 0.0 < self.max_gib < float("inf"):
             raise HubError(f"--max-gib must be above 0, got {self.max_gib}.")
+        _refuse_onnx(self.out)
         if self.out.suffix in POLICY_FILES:
             self._pull_policy()
         else:
@@ -113,6 +115,14 @@ class HubPull:
         say(
             f"wrote {self.out}: {counted(len(episodes), 'episode')}, {counted(steps, 'step')}, "
             f"revision {commit}"
+        )
+
+
+def _refuse_onnx(path: Path) -> None:
+    if path.suffix == ".onnx":
+        raise HubError(
+            f"{path} would be ONNX, and a repository holds the .safetensors file of a policy, from "
+            "which `shapechanger policies export` writes ONNX."
         )
 
 
