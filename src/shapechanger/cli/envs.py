@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, cast
 
-import gymnasium as gym
 import tyro
 from rich.table import Table
 from rich.text import Text
@@ -68,7 +67,17 @@ class Envs:
                     asked(other, "certify_shift")
                     say(str(asked(env, "certify_shift")(env, other)))
             elif self.picture is None and not self.check:
-                _show(env)
+                observation, action = layouts_of(env)
+                print_table(_layout_table("action", action))
+                print_table(_layout_table("observation", observation))
+                for name, unit in (
+                    ("standing_height", "m"),
+                    ("healthy_z_range", "m"),
+                    ("body", ""),
+                ):
+                    value = getattr(env.unwrapped, name, None)
+                    if value is not None and value != ():
+                        say(f"{name.replace('_', ' ')}: {_in_words(value)} {unit}".rstrip())
 
 
 def _list(*, odrl: bool) -> None:
@@ -87,16 +96,6 @@ def _list(*, odrl: bool) -> None:
         f"{targets} targets of ODRL and their {robots} sources: `envs --odrl`",
     )
     print_table(table)
-
-
-def _show(env: gym.Env[Any, Any]) -> None:
-    observation, action = layouts_of(env)
-    print_table(_layout_table("action", action))
-    print_table(_layout_table("observation", observation))
-    for name, unit in (("standing_height", "m"), ("healthy_z_range", "m"), ("body", "")):
-        value = getattr(env.unwrapped, name, None)
-        if value is not None and value != ():
-            say(f"{name.replace('_', ' ')}: {_in_words(value)} {unit}".rstrip())
 
 
 def _layout_table(side: str, layout: Layout) -> Table:

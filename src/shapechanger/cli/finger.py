@@ -148,17 +148,16 @@ class FingerExport:
         require_file(self.out)
         if self.gap and self.parameters:
             raise FingerError("Give either --parameters or --gap, not both.")
-        finger = _parameters(self.parameters) if self.parameters else NOMINAL
-        if self.gap:
+        finger, path = NOMINAL, Path(self.parameters)
+        if self.parameters in PARAMETER_SETS or (
+            self.parameters and not (path.suffix or path.exists())
+        ):
+            finger = named_set(self.parameters)
+        elif self.parameters:
+            with reading(path, FingerError):
+                finger = FingerParameters.from_json(read_file(path, _MOST_BYTES))
+        elif self.gap:
             finger = resolve_gap(self.gap).draw(np.random.default_rng(self.finger_seed))
         text = finger_mjcf(finger, drive_of(self.actions, NOMINAL))
         write_atomic(self.out, text.encode())
         say(f"wrote {self.out}")
-
-
-def _parameters(given: str) -> FingerParameters:
-    path = Path(given)
-    if given in PARAMETER_SETS or not (path.suffix or path.exists()):
-        return named_set(given)
-    with reading(path, FingerError):
-        return FingerParameters.from_json(read_file(path, _MOST_BYTES))

@@ -48,7 +48,16 @@ class HubPush:
                 say(f"pushed {self.path} to {address}")
                 return
             episodes = [read_episode(path) for path in episodes_of(self.path)]
-            card = _recording_card(episodes, _linked(episodes, folder), self.repo)
+            hashes: dict[str, str] = {}  # SHA-256 of the steps of each episode.
+            for episode in episodes:
+                name = f"{hub.EPISODES}/{episode.path.resolve().name}"
+                frames = {f"{FRAMES}/{step.frame}" for step in episode.steps if step.frame}
+                for file in (HEADER, STEPS, *frames):  # `lost/` is not uploaded.
+                    link = folder / name / file
+                    link.parent.mkdir(parents=True, exist_ok=True)
+                    link.symlink_to((episode.path / file).resolve())
+                hashes[f"{name}/{STEPS}"] = hub.sha256_of(episode.path / STEPS)
+            card = _recording_card(episodes, hashes, self.repo)
             address = hub.push(folder, card, self.repo, "demonstrations", public=self.public)
             say(f"pushed {counted(len(episodes), 'episode')} of {self.path} to {address}")
 

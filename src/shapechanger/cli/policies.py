@@ -33,7 +33,7 @@ from shapechanger.envs.catalogue import (
 from shapechanger.envs.opengl import has_screen
 from shapechanger.errors import ShapechangerError, StudyError, check_seed
 from shapechanger.identity import identify_env, texts_in
-from shapechanger.policy import STEERING, CloneNetwork, PolicyCard, load_policy
+from shapechanger.policy import STEERING, PolicyCard, load_policy
 from shapechanger.reports.films import require_film, write_film
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.identities import ENV, known, require_same_env
@@ -214,7 +214,14 @@ class PoliciesShow:
 
     def run(self) -> None:
         if self.references:
-            _print_references()
+            table = Table("env", "learner", "steps", "measure", "no skill", "each seed", box=None)
+            for env, reference in load_references().items():
+                measure = next(iter(reference.ends))
+                floor = max(values[measure] for values in reference.floor.values())
+                ends = ", ".join(f"{value:.4g}" for value in reference.ends[measure])
+                steps = f"{reference.steps:,}"
+                table.add_row(env, reference.learner, steps, measure, f"{floor:.4g}", ends)
+            print_table(table)
         elif self.path.suffix in POLICY_FILES:
             _show(self.path, self.learner)
         else:
@@ -274,17 +281,6 @@ def _list(folder: Path) -> None:
     print_table(table)
 
 
-def _print_references() -> None:
-    table = Table("env", "learner", "steps", "measure", "no skill", "each seed", box=None)
-    for env, reference in load_references().items():
-        measure = next(iter(reference.ends))
-        floor = max(values[measure] for values in reference.floor.values())
-        ends = ", ".join(f"{value:.4g}" for value in reference.ends[measure])
-        steps = f"{reference.steps:,}"
-        table.add_row(env, reference.learner, steps, measure, f"{floor:.4g}", ends)
-    print_table(table)
-
-
 @dataclass(frozen=True, kw_only=True)
 class PoliciesEvaluate(_InEnv):
     """Run a policy for some episodes, and print its measures."""
@@ -328,8 +324,12 @@ class PoliciesExport(_InEnv):
         if self.file.suffix == ".onnx":
             raise StudyError(f"{self.file} has been exported already.")
         if policy.card.clone is not None:
-            body, control_hz = _learned_with(policy.card, policy.card.clone)
-            net = msgspec.structs.replace(policy.net, body=body, control_hz=control_hz)
+            net, env = policy.net, policy.card.env
+            if env is not None:  # Waypoints have the same meaning in all bodies.
+                is_vehicle = env.id in VEHICLE_ENVS
+                body = VEHICLE_ENVS[env.id].kwargs["vehicle"] if is_vehicle else ""
+                control_hz = 1.0 / PERIOD_S if body or env.id in WAYPOINT_ENVS else None
+                net = msgspec.structs.replace(net, body=body, control_hz=control_hz)
             policy.carded(clone=net).export(self.out)
         else:
             from shapechanger.transfer.export import export_limbs, export_onnx  # PyTorch.
@@ -346,15 +346,6 @@ class PoliciesExport(_InEnv):
             else:
                 export_onnx(policy, self.out)
         say(f"wrote {self.out}")
-
-
-def _learned_with(card: PolicyCard, net: CloneNetwork) -> tuple[str, float | None]:
-    """Return body and steps per second of a clone's demonstrations; "" or None if unknown."""
-    if card.env is None:
-        return net.body, net.control_hz
-    # Waypoints have the same meaning in all bodies.
-    body = VEHICLE_ENVS[card.env.id].kwargs["vehicle"] if card.env.id in VEHICLE_ENVS else ""
-    return body, 1.0 / PERIOD_S if body or card.env.id in WAYPOINT_ENVS else None
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -49,13 +48,22 @@ class DemosShow:
     """The page to write, such as page.html; it needs no other file."""
 
     def run(self) -> None:
-        found = _read_all(self.data)
+        # Each episode, or the reason why it cannot be read.
+        found: dict[Path, Episode | DemosError] = {}
+        for path in episodes_of(self.data):
+            try:
+                found[path] = read_episode(path)
+            except DemosError as error:
+                found[path] = error
         episodes = [one for one in found.values() if isinstance(one, Episode)]
         if self.out is not None:
             require_file(self.out)
         else:
             print_table(_table(found))
-        say(_totals(len(found), episodes))
+        steps = sum(len(one.steps) for one in episodes)
+        kept = sum(len(one.kept) for one in episodes)
+        length = duration_text(sum(one.seconds for one in episodes))
+        say(f"{counted(len(found), 'episode')}: {kept} of {steps} steps count, {length}")
         counts = Counter(step.driver for one in episodes for step in one.kept)
         if counts:
             say(f"driven by {shares_text(dict(counts.most_common()))}")
@@ -99,24 +107,6 @@ def _table(found: dict[Path, Episode | DemosError]) -> Table:
             one.outcome if one.closed else "not closed",
         )
     return table
-
-
-def _read_all(data: Path) -> dict[Path, Episode | DemosError]:
-    """Return each episode of a recording, or why it cannot be read."""
-    found: dict[Path, Episode | DemosError] = {}
-    for path in episodes_of(data):
-        try:
-            found[path] = read_episode(path)
-        except DemosError as error:
-            found[path] = error
-    return found
-
-
-def _totals(count: int, episodes: Sequence[Episode]) -> str:
-    steps = sum(len(one.steps) for one in episodes)
-    kept = sum(len(one.kept) for one in episodes)
-    seconds = sum(one.seconds for one in episodes)
-    return f"{counted(count, 'episode')}: {kept} of {steps} steps count, {duration_text(seconds)}"
 
 
 @dataclass(frozen=True)

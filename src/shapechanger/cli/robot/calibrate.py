@@ -184,7 +184,10 @@ class Calibration:
 
     def _wheel(self, name: str, wheel_m: float) -> dict[str, float]:
         say(f"\n{name}: push the robot 1 m forward by hand, then Enter …")
-        with self._served({}) as robot, _live_line() as live:
+        with (
+            self._served({}) as robot,
+            Live(console=plain_console(), refresh_per_second=10, transient=True) as live,
+        ):
             place: int = Layout.from_json(robot.welcome.state_layout).slices["speed"].start
             travelled_m = 0.0
             seen = robot.ask().message
@@ -225,7 +228,7 @@ class Calibration:
         asked = False
         before: tuple[float, ...] = ()
         seen = robot.ask().message
-        with _live_line() as live:
+        with Live(console=plain_console(), refresh_per_second=10, transient=True) as live:
             while True:
                 if not seen.armed:
                     raise RobotError(f"The robot stopped: {seen.stop_reason}")
@@ -285,10 +288,6 @@ class Calibration:
                 client.take()
                 client.arm()
                 yield client
-
-
-def _live_line() -> Live:
-    return Live(console=plain_console(), refresh_per_second=10, transient=True)
 
 
 def ask_for_wheels_up() -> None:

@@ -80,21 +80,18 @@ class RobotRemember:
 
     def run(self) -> None:
         """Ask for the key, which would be visible on a command line, and store everything."""
-        key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
+        key = os.environ.get(_KEY_VARIABLE, "")
+        if not key and sys.stdin.isatty():
+            key = getpass.getpass(f"key of {self.name}: ")
+        elif not key:
+            key = sys.stdin.readline()
+            if not key.strip():
+                raise LinkError(
+                    f"The robot's key is needed: type it, or set {_KEY_VARIABLE}. "
+                    "`shapechanger robot key NAME` shows it on the robot."
+                )
         path = remember(KnownRobot(self.name, self.address, key.strip(), self.fingerprint))
         say(f"wrote {path}")
-
-
-def _asked_key(name: str) -> str:
-    if sys.stdin.isatty():
-        return getpass.getpass(f"key of {name}: ")
-    key = sys.stdin.readline()
-    if not key.strip():
-        raise LinkError(
-            f"The robot's key is needed: type it, or set {_KEY_VARIABLE}. "
-            "`shapechanger robot key NAME` shows it on the robot."
-        )
-    return key
 
 
 # Time limit for the report of a stop, s. A guard stops within a tick and then reports it.

@@ -80,7 +80,10 @@ class RobotInit:
         console, kinds = plain_console(), shipped_profiles()
         say("Kinds of robot:")
         for kind, path in kinds.items():
-            say(f"  {kind:10}  {_first_sentence(path)}")
+            # The first sentence of the comment at the head of the profile.
+            head = takewhile(lambda line: line.startswith("#"), profile_text(path).splitlines())
+            summary = " ".join(line.lstrip("# ") for line in head).partition(". ")[0].rstrip(".")
+            say(f"  {kind:10}  {summary}")
 
         def ask(question: str, default: str, *choices: str) -> str:
             return Prompt.ask(
@@ -187,12 +190,6 @@ def shown_credentials(name: str, credentials: Credentials) -> str:
         f"      shapechanger robot remember {name} {socket.gethostname()}.local "
         f"--fingerprint {fingerprint.hex()}"
     )
-
-
-def _first_sentence(profile: Path) -> str:
-    """Return the first sentence of the comment at the head of a shipped profile."""
-    lines = takewhile(lambda line: line.startswith("#"), profile_text(profile).splitlines())
-    return " ".join(line.lstrip("# ") for line in lines).partition(". ")[0].rstrip(".")
 
 
 def own_profile(name: str) -> Path:
