@@ -67,23 +67,23 @@ def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
         browser = ServiceBrowser(own, SERVICE, handlers=[changed])
         threading.Event().wait(timeout_s)
         browser.cancel()  # It waits for the browser's thread.
-        robots = [robot for name in names if (robot := _resolved(own, name, timeout_s))]
+        robots: list[FoundRobot] = []
+        for name in names:
+            info = own.get_service_info(SERVICE, name, int(timeout_s * 1e3))
+            addresses = info.parsed_scoped_addresses() if info else []
+            if info is None or info.port is None or not addresses:
+                continue
+            said = info.decoded_properties
+            robots.append(
+                FoundRobot(
+                    name=said.get("id") or name.removesuffix(f".{SERVICE}"),
+                    body=said.get("body") or "",
+                    address=Address(addresses[0], info.port),
+                    fingerprint=said.get("fp") or "",
+                    version=said.get("v") or "",
+                )
+            )
     return sorted(robots, key=lambda robot: (robot.name, str(robot.address)))
-
-
-def _resolved(zeroconf: Zeroconf, name: str, timeout_s: float) -> FoundRobot | None:
-    info = zeroconf.get_service_info(SERVICE, name, int(timeout_s * 1e3))
-    addresses = info.parsed_scoped_addresses() if info else []
-    if info is None or info.port is None or not addresses:
-        return None
-    said = info.decoded_properties
-    return FoundRobot(
-        name=said.get("id") or name.removesuffix(f".{SERVICE}"),
-        body=said.get("body") or "",
-        address=Address(addresses[0], info.port),
-        fingerprint=said.get("fp") or "",
-        version=said.get("v") or "",
-    )
 
 
 async def announce(

@@ -42,15 +42,12 @@ class LowAtOncePin(LGPIOPin):
     def _set_state(self, value: float) -> None:
         super()._set_state(value)
         if value == 0:
-            self._write_low()
+            lgpio.gpio_write(self.factory._handle, self._number, 0)
 
     def _set_frequency(self, value: float | None) -> None:
         super()._set_frequency(value)
         if value is None or value == 0:
-            self._write_low()
-
-    def _write_low(self) -> None:
-        lgpio.gpio_write(self.factory._handle, self._number, 0)
+            lgpio.gpio_write(self.factory._handle, self._number, 0)
 
 
 class LowAtOnceFactory(LGPIOFactory):

@@ -91,7 +91,13 @@ def examine(robot: StandingRobot) -> Iterator[Finding]:
 def _checks(robot: StandingRobot) -> Checks:
     if not robot.on_twin:
         if robot.installed:
-            yield from _installation(robot)
+            profile = robot.profile
+            yield "profile", [("good", f"{profile.path} is valid.")]
+            yield "credentials", _credentials(robot)
+            if profile.calibrated is None:
+                remedy = f"Never calibrated: shapechanger robot calibrate {profile.path}"
+                yield "calibration", [("unknown", remedy)]
+            yield "systemd", _unit(robot)
         yield from _computer(robot)
     # While a robot is served, its guard uses the pins and buses.
     if not robot.port_error and importlib.util.find_spec("gpiozero") is not None:
@@ -100,16 +106,6 @@ def _checks(robot: StandingRobot) -> Checks:
     if robot.installed and not robot.on_twin:
         otherwise = f"Port {robot.port} cannot be used ({robot.port_error}). Is the robot served?"
         yield "port", [judged(not robot.port_error, f"Port {robot.port} is free.", otherwise)]
-
-
-def _installation(robot: StandingRobot) -> Checks:
-    profile = robot.profile
-    yield "profile", [("good", f"{profile.path} is valid.")]
-    yield "credentials", _credentials(robot)
-    if profile.calibrated is None:
-        remedy = f"Never calibrated: shapechanger robot calibrate {profile.path}"
-        yield "calibration", [("unknown", remedy)]
-    yield "systemd", _unit(robot)
 
 
 def _computer(robot: StandingRobot) -> Checks:
@@ -130,7 +126,15 @@ def _computer(robot: StandingRobot) -> Checks:
     yield "packages", _packages(profile)
     if (camera := profile.camera) is not None:
         yield "camera", _camera(camera)
-        yield "camera's geometry", [_geometry(camera)]
+        if camera.pitch_deg is None or camera.fovy_deg is None:
+            reason = "pitch_deg and fovy_deg are missing, and policies with waypoints need them: "
+            geometry = "unknown", reason + "`shapechanger robot camera` measures them."
+        else:
+            view = (
+                f"It looks {camera.pitch_deg:g} degrees down and sees {camera.fovy_deg:g} degrees "
+            )
+            geometry = "good", view + "from top to bottom; `shapechanger robot camera` draws it."
+        yield "camera's geometry", [geometry]
 
 
 def _wiring(robot: StandingRobot) -> Checks:
@@ -222,14 +226,6 @@ def _packages(profile: Profile) -> Results:
 def _camera(plan: CameraPlan) -> Results:
     with closing(open_camera(plan)) as camera:
         yield "good", f"{plan.driver} sent a frame of {len(camera.read().jpeg)} bytes."
-
-
-def _geometry(plan: CameraPlan) -> Result:
-    if plan.pitch_deg is None or plan.fovy_deg is None:
-        reason = "pitch_deg and fovy_deg are missing, and policies with waypoints need them: "
-        return "unknown", reason + "`shapechanger robot camera` measures them."
-    view = f"It looks {plan.pitch_deg:g} degrees down and sees {plan.fovy_deg:g} degrees from "
-    return "good", view + "top to bottom; `shapechanger robot camera` draws it."
 
 
 def _close(robot: StandingRobot) -> Results:

@@ -179,7 +179,14 @@ class Inbox:
             self.heard += 1
             match message:
                 case messages.Observation():
-                    self._observe(message)
+                    if message.seq <= self.seq:
+                        raise LinkError(
+                            f"Observation {message.seq} arrived after {self.seq}, as in a replay."
+                        )
+                    last, jpeg = self.newest, message.frame
+                    if jpeg is None and last and message.frame_seq == last.message.frame_seq:
+                        jpeg = last.jpeg
+                    self.newest = Received(message, self._clock(), jpeg)
                 case messages.Event():
                     self._events.append(message)
                 case messages.Refused(fatal=True):
@@ -267,12 +274,3 @@ class Inbox:
     def refusal(self, seq: int) -> str:
         """Return why the robot refused message `seq`; "" if it did not, or refused one since."""
         return self._refusals.get(seq, "")
-
-    def _observe(self, message: messages.Observation) -> None:
-        last = self.newest
-        if message.seq <= self.seq:
-            raise LinkError(f"Observation {message.seq} arrived after {self.seq}, as in a replay.")
-        jpeg = message.frame
-        if jpeg is None and last is not None and message.frame_seq == last.message.frame_seq:
-            jpeg = last.jpeg
-        self.newest = Received(message, self._clock(), jpeg)

@@ -250,18 +250,6 @@ class KeyParser:
         return _ARROWS.get(text, OTHER)
 
 
-def _as_typed(keys: list[str]) -> list[str]:
-    """Return the keys of one read that a person can have meant.
-
-    A stop cancels all other keys. Three or more different keys at once are pasted text, which not
-    all terminals mark, or old keys from a link that was interrupted.
-    """
-    stops = [key for key in keys if key in STOPS]
-    if stops:
-        return stops[:1]
-    return keys if len({*keys} - {"enter", OTHER}) <= _AT_ONCE else [OTHER]
-
-
 _AT_ONCE: Final = 2  # Different keys that a person presses at once.
 
 
@@ -296,6 +284,8 @@ class Terminal:
     def keys(self, wait_s: float) -> list[str]:
         """Return the keys pressed since the last call, waiting up to `wait_s` seconds for one.
 
+        Only keys that a person can have meant are returned.
+
         Raises:
             NoTerminal: If the terminal was closed.
         """
@@ -306,7 +296,12 @@ class Terminal:
             if data := self._read(0.0 if keys else min(until_s, self._parser.due_s) - now_s):
                 keys += self._parser.feed(data, time.monotonic())
             if keys or time.monotonic() >= until_s:
-                return _as_typed(keys)
+                # A stop cancels all other keys.
+                if stops := [key for key in keys if key in STOPS]:
+                    return stops[:1]
+                # More different keys at once are pasted text, which not all terminals mark, or old
+                # keys from a link that was interrupted.
+                return keys if len({*keys} - {"enter", OTHER}) <= _AT_ONCE else [OTHER]
 
     def _read(self, wait_s: float) -> bytes:
         data = b""

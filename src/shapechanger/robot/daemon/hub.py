@@ -115,7 +115,8 @@ class SessionHub:
         """Remove a client; if it had control, the robot stops and is disarmed."""
         if self._clients.pop(client.session, None) is None:
             return
-        self._drop_suggestion(client)
+        if self._suggestion.client is client:
+            self._suggestion = _NOTHING
         self.release(client, f"the connection to {client.name} ended")
         if self.recorder.on and not any(other.is_person for other in self._clients.values()):
             self.recorder.end("The last person disconnected, which ended the recording.")
@@ -131,7 +132,8 @@ class SessionHub:
             reason = f"{held.name} has control; a {client.role} cannot take it from a {held.role}."
             client.post(messages.Lease(mine=False, holder=held.name, reason=reason))
             return
-        self._drop_suggestion(client)
+        if self._suggestion.client is client:
+            self._suggestion = _NOTHING
         reason = f"{client.name} has control."
         if held is not client:
             self.holder = client
@@ -249,14 +251,16 @@ class SessionHub:
             elif self.holder is not None:
                 # Only the lease holder needs to learn of a refused command.
                 self.holder.post(refused)
-        self._notify()
+        for client in self._clients.values():
+            client.updated.set()
 
     def on_frame(self, frame: Frame) -> None:
         """Handle a new, valid frame of the camera."""
         self.frame = frame
         self.frame_seq += 1
         self._frame_arrived.set()
-        self._notify()
+        for client in self._clients.values():
+            client.updated.set()
 
     async def step(self, seconds: float) -> None:
         """Let `seconds` of the robot's time pass, and then handle the states of the guard."""
@@ -285,14 +289,6 @@ class SessionHub:
         for client in self._clients.values():
             mine = self.holder is client
             client.post(messages.Lease(mine=mine, holder=self.holder_name, reason=reason))
-
-    def _drop_suggestion(self, client: Client) -> None:
-        if self._suggestion.client is client:
-            self._suggestion = _NOTHING
-
-    def _notify(self) -> None:
-        for client in self._clients.values():
-            client.updated.set()
 
     async def _one_step(self, seconds: float) -> None:
         async with self._one_step_at_a_time:

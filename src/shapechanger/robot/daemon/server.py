@@ -252,8 +252,17 @@ class Server:
         self._hub = hub
         self._authenticator = authenticator
         self._numbers = itertools.count(1)
+        app = web.Application(middlewares=[self._renew_timeout], client_max_size=1024)
+        app.on_response_prepare.append(_add_headers)
+        files = console_files()
+        app.router.add_get("/", partial(_serve_file, *files[ENTRY]))
+        for name, file in files.items():
+            app.router.add_get(f"{_CONSOLE}{name}", partial(_serve_file, *file))
+        app.router.add_get(f"{_CONSOLE}robot.json", self._robot)
+        app.router.add_get("/healthz", self._health)
+        app.router.add_get("/link", self._link)
         self._runner = web.AppRunner(
-            self._app(), access_log=None, handle_signals=False, shutdown_timeout=_SHUTDOWN_S
+            app, access_log=None, handle_signals=False, shutdown_timeout=_SHUTDOWN_S
         )
         self._listener = Listener(self._protocol, tls)
 
@@ -266,18 +275,6 @@ class Server:
         """Close all connections."""
         await self._listener.close()
         await self._runner.cleanup()
-
-    def _app(self) -> web.Application:
-        app = web.Application(middlewares=[self._renew_timeout], client_max_size=1024)
-        app.on_response_prepare.append(_add_headers)
-        files = console_files()
-        app.router.add_get("/", partial(_serve_file, *files[ENTRY]))
-        for name, file in files.items():
-            app.router.add_get(f"{_CONSOLE}{name}", partial(_serve_file, *file))
-        app.router.add_get(f"{_CONSOLE}robot.json", self._robot)
-        app.router.add_get("/healthz", self._health)
-        app.router.add_get("/link", self._link)
-        return app
 
     def _protocol(self) -> web.RequestHandler:
         server = self._runner.server

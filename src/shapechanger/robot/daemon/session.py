@@ -339,7 +339,11 @@ class Session:
         try:
             async with asyncio.TaskGroup() as group:
                 others = [group.create_task(work) for work in (self._answer(), self._observe())]
-                await self._listen()
+                while (data := await self._read()) is not None:
+                    self.receive(data)
+                    await self._hub.settle()
+                    if self.client.awaits():
+                        await asyncio.sleep(0)  # Let other tasks run; requests may come very fast.
                 for task in others:
                     task.cancel()
         except ExceptionGroup as errors:
@@ -355,13 +359,6 @@ class Session:
         ):
             async with asyncio.timeout(_SEND_S):
                 await sending
-
-    async def _listen(self) -> None:
-        while (data := await self._read()) is not None:
-            self.receive(data)
-            await self._hub.settle()
-            if self.client.awaits():
-                await asyncio.sleep(0)  # Let other tasks run, even if requests come very fast.
 
     async def _answer(self) -> None:
         client = self.client

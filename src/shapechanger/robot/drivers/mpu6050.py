@@ -106,7 +106,16 @@ class SimulatedMpu6050(SimulatedChip):
     def read(self, register: int, length: int) -> list[int]:
         """Read bytes, starting at a register."""
         if not self._registers[_PWR_MGMT_1] & _SLEEP:
-            self._measure()
+            seen = self._world.inputs()
+            per_g = _LSB_PER_G[self._registers[_ACCEL_CONFIG] >> 3 & 3]
+            per_rate = _LSB_PER_DEG_PER_S[self._registers[_GYRO_CONFIG] >> 3 & 3]
+            ahead, left = (
+                a / _STANDARD_GRAVITY * per_g for a in (seen.acceleration_x, seen.acceleration_y)
+            )
+            yaw = math.degrees(seen.yaw_rate) * per_rate
+            values = (ahead, left, per_g, 0.0, 0.0, 0.0, yaw)
+            raw = [max(-32768, min(32767, round(value))) for value in values]
+            _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *raw)
         return [self._registers[(register + i) % 128] for i in range(length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
@@ -114,16 +123,6 @@ class SimulatedMpu6050(SimulatedChip):
         for at, byte in enumerate(data, register):
             if at % 128 != _WHO_AM_I:
                 self._registers[at % 128] = byte
-
-    def _measure(self) -> None:
-        seen = self._world.inputs()
-        per_g = _LSB_PER_G[self._registers[_ACCEL_CONFIG] >> 3 & 3]
-        per_rate = _LSB_PER_DEG_PER_S[self._registers[_GYRO_CONFIG] >> 3 & 3]
-        x, y = (a / _STANDARD_GRAVITY * per_g for a in (seen.acceleration_x, seen.acceleration_y))
-        yaw = math.degrees(seen.yaw_rate) * per_rate
-        values = (x, y, per_g, 0.0, 0.0, 0.0, yaw)
-        raw = [max(-32768, min(32767, round(value))) for value in values]
-        _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *raw)
 
 
 MPU6050: Final = SensorChip(

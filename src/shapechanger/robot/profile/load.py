@@ -76,7 +76,13 @@ def profile_text(path: str | os.PathLike[str]) -> str:
         # mark.
         text = data.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError as error:
-        raise ProfileError(f"There is no file {path}{_instead_of(path)}.") from error
+        known = dict.fromkeys(shipped_profiles(), " of Shapechanger")
+        here = sorted(path.parent.glob(f"*{_SUFFIX}"))
+        known |= {file.stem: f" in {path.parent}" for file in here}
+        close = difflib.get_close_matches(path.stem, known, n=1)
+        near = f" (did you mean {close[0]}{known[close[0]]}?)" if close else ""
+        listed = ", ".join([*known][:_MOST_LISTED])
+        raise ProfileError(f"There is no file {path}{near}; there are: {listed}.") from error
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise ProfileError(f"{path}, line {line}: this is not UTF-8 text.") from error
@@ -86,15 +92,6 @@ def profile_text(path: str | os.PathLike[str]) -> str:
     if len(data) > _LARGEST:
         raise ProfileError(f"{path} is longer than a profile can be, 1 MiB.")
     return text
-
-
-def _instead_of(path: Path) -> str:
-    """Return the end of a sentence about a missing profile: the nearest name, and up to 40."""
-    known = dict.fromkeys(shipped_profiles(), " of Shapechanger")
-    known |= {file.stem: f" in {path.parent}" for file in sorted(path.parent.glob(f"*{_SUFFIX}"))}
-    close = difflib.get_close_matches(path.stem, known, n=1)
-    near = f" (did you mean {close[0]}{known[close[0]]}?)" if close else ""
-    return f"{near}; there are: {', '.join([*known][:_MOST_LISTED])}"
 
 
 def starter_text(

@@ -34,33 +34,6 @@ QUANTITIES: Final = {
 }
 
 
-def _state_features(plan: GuardPlan) -> list[Feature]:
-    """Return a feature for each quantity that a robot senses.
-
-    Without a speed sensor, the guard estimates the speed from a propelling action whose profile
-    gives its gain in m/s.
-    """
-    sources: dict[str, Element] = {}
-    for sensor in plan.sensors:
-        sources.setdefault(sensor.measures, Element("sensor", sensor.name))
-    if "speed" in sources and plan.limits.stall_s > 0.0:
-        sources["stall"] = sources["speed"]
-    if bumped := sources.get("bump", sources.get("stall")):
-        sources["collision"] = bumped
-    for action in plan.actions:
-        if action.propels and action.unit == "m/s":
-            sources.setdefault("speed", Element("actuator", action.name))
-    known = [
-        Feature(name, unit, low, high, sources[measures])
-        for name, (unit, low, high, measures) in QUANTITIES.items()
-        if measures in sources
-    ]
-    for sensor in plan.sensors:
-        if (features := SENSORS[sensor.driver].features) is not None:
-            known += features(sensor)
-    return known
-
-
 def _tendon_spans(outputs: Sequence[OutputPlan]) -> dict[str, tuple[float, str]]:
     """Return span and unit of each action that moves one tendon, without other actions or weights.
 
@@ -184,9 +157,31 @@ class Profile(GuardPlan, RobotTable, CommandTable):
         return Layout(tuple(features))
 
     def state_layout(self) -> Layout:
-        """Return the layout of states: sensed quantities, then applied actions."""
-        applied = (_feature(action, "/applied") for action in self.actions)
-        return Layout((*_state_features(self), *applied))
+        """Return the layout of states: sensed quantities, then applied actions.
+
+        Without a speed sensor, the guard estimates the speed from a propelling action whose profile
+        gives its gain in m/s.
+        """
+        sources: dict[str, Element] = {}
+        for sensor in self.sensors:
+            sources.setdefault(sensor.measures, Element("sensor", sensor.name))
+        if "speed" in sources and self.limits.stall_s > 0.0:
+            sources["stall"] = sources["speed"]
+        if bumped := sources.get("bump", sources.get("stall")):
+            sources["collision"] = bumped
+        for action in self.actions:
+            if action.propels and action.unit == "m/s":
+                sources.setdefault("speed", Element("actuator", action.name))
+        features = [
+            Feature(name, unit, low, high, sources[measures])
+            for name, (unit, low, high, measures) in QUANTITIES.items()
+            if measures in sources
+        ]
+        for sensor in self.sensors:
+            if (own := SENSORS[sensor.driver].features) is not None:
+                features += own(sensor)
+        features += (_feature(action, "/applied") for action in self.actions)
+        return Layout(tuple(features))
 
 
 def _feature(action: ActionPlan, suffix: str = "", **gain: Any) -> Feature:

@@ -177,7 +177,18 @@ class Board:
 
     def _execute(self, connection: BoardConnection, call: Call) -> None:
         try:
-            result = self._result(connection, call)
+            function = self._functions.get(call.function)
+            if function is None:
+                raise RobotError(f"The board has no function {call.function!r}.")
+            # A call of an operator takes effect after all calls that the robot's processes have
+            # sent before. Before a claim, the end of the pin's previous owner must be handled.
+            if connection.role == "operator" or call.function == "claim":
+                for other in [*self._connections.values()]:
+                    if other.role == "hardware":
+                        self._execute_all(other)
+            connection.call_id = call.id
+            connection.t = self.now_ns() if self._clock == "twin" else call.t
+            result = function(connection, call.arguments)
         except (ShapechangerError, OSError) as refusal:  # The board runs on.
             if call.id is None:
                 _log.warning("process %d: %s", connection.pid, refusal)
@@ -186,20 +197,6 @@ class Board:
         else:
             if result is not _LATER:
                 connection.reply(call.id, result)
-
-    def _result(self, connection: BoardConnection, call: Call) -> object:
-        function = self._functions.get(call.function)
-        if function is None:
-            raise RobotError(f"The board has no function {call.function!r}.")
-        # A call of an operator takes effect after all calls that the robot's processes have sent
-        # before. Before a claim, the end of the pin's previous owner must be handled.
-        if connection.role == "operator" or call.function == "claim":
-            for other in [*self._connections.values()]:
-                if other.role == "hardware":
-                    self._execute_all(other)
-        connection.call_id = call.id
-        connection.t = self.now_ns() if self._clock == "twin" else call.t
-        return function(connection, call.arguments)
 
     def _advance(self, now_ns: int) -> None:
         """Advance the world to a time, and take the image that is due."""

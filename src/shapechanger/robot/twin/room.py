@@ -97,7 +97,18 @@ class DrivingWorld(World):
             raise RobotError(f"No vehicle has all of these parts: {', '.join(sorted(parts))}.")
         self._drive = kinds[0] if kinds else _Drive({})  # Other parts do not move.
         self._first_stripe = random.Random(f"room {seed}").uniform(0.0, 2.0 * _STRIPE)
-        self._aim(size, math.radians(pitch_deg or 0.0), fovy_deg)
+        (width, height), pitch = size, math.radians(pitch_deg or 0.0)
+        across = width if fovy_deg is None else height
+        angle = _FIELD_OF_VIEW if fovy_deg is None else math.radians(fovy_deg)
+        focal = (across / 2) / math.tan(angle / 2)  # In pixels.
+        right = (np.arange(width) + 0.5 - width / 2) / focal
+        below = ((np.arange(height) + 0.5 - height / 2) / focal)[:, np.newaxis]
+        down = math.sin(pitch) + math.cos(pitch) * below
+        ahead = math.cos(pitch) - math.sin(pitch) * below
+        # The bearing of each column, rad, and the downward slope of each pixel's ray. All pixels of
+        # a column have the bearing of its middle, also if the camera is pitched.
+        self._bearings = -np.arctan2(right, math.cos(pitch))
+        self._slopes = down / np.hypot(right, ahead)
         self._travelled = 0.0
         self.place(seed)
 
@@ -155,22 +166,6 @@ class DrivingWorld(World):
         below = (self._slopes * distance)[..., np.newaxis]
         picture = np.where(below < _CAMERA_HEIGHT, colours, _FLOOR)
         return np.where(below < _CAMERA_HEIGHT - _WALL_HEIGHT, _CEILING, picture)
-
-    def _aim(self, size: tuple[int, int], pitch: float, fovy_deg: float | None) -> None:
-        """Set the bearing of each column, rad, and the downward slope of each pixel's ray.
-
-        All pixels of a column have the bearing of its middle, also if the camera is pitched.
-        """
-        width, height = size
-        across = width if fovy_deg is None else height
-        angle = _FIELD_OF_VIEW if fovy_deg is None else math.radians(fovy_deg)
-        focal = (across / 2) / math.tan(angle / 2)  # In pixels.
-        right = (np.arange(width) + 0.5 - width / 2) / focal
-        below = ((np.arange(height) + 0.5 - height / 2) / focal)[:, np.newaxis]
-        down = math.sin(pitch) + math.cos(pitch) * below
-        ahead = math.cos(pitch) - math.sin(pitch) * below
-        self._bearings = -np.arctan2(right, math.cos(pitch))
-        self._slopes = down / np.hypot(right, ahead)
 
     def _cast(self, bearings: _Floats) -> tuple[_Floats, NDArray[np.intp], _Floats]:
         """Return each ray's distance to a wall, m, the wall, 0 to 3, and the place along it, m."""

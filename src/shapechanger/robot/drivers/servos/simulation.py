@@ -250,7 +250,15 @@ class SimulatedServo:
         if self._watchdog_ns is not None and now_ns - self._fed_ns >= self._watchdog_ns:
             self.values |= {"mark": TRIPPED, "goal": 0}
             self._cache()
-        self.motor.advance(self._controlled_a(), self.volts, travel_m, dt_s)
+        current_a = self.pulls_a  # The current that the servo's controller requests.
+        if self._pulls_angle is not None and self.pulls_a:
+            most = abs(self.pulls_a)
+            wanted = self._model.stall_a * (self._pulls_angle - self.motor.angle) / _STALL_AT
+            current_a = min(max(wanted, -most), most)
+            if "tension" not in self.family.modes:
+                volts = self.volts * current_a / self._model.stall_a
+                current_a = self.motor.current_at(volts)
+        self.motor.advance(current_a, self.volts, travel_m, dt_s)
         if self.motor.temperature > self._model.most_c:
             self.fail(_HOT)
         if self.volts and not self._model.least_v <= self.volts <= self._model.most_v:
@@ -261,17 +269,6 @@ class SimulatedServo:
         if self.family.refused:
             return ServoReply(refusal | (self.family.alert if failed else 0), data)
         return ServoReply(failed, data)
-
-    def _controlled_a(self) -> float:
-        """Return the current that the servo's controller requests, A."""
-        if self._pulls_angle is None or not self.pulls_a:
-            return self.pulls_a
-        most = abs(self.pulls_a)
-        wanted = self._model.stall_a * (self._pulls_angle - self.motor.angle) / _STALL_AT
-        wanted = min(max(wanted, -most), most)
-        if "tension" in self.family.modes:
-            return wanted
-        return self.motor.current_at(self.volts * wanted / self._model.stall_a)
 
     def _cache(self) -> None:
         """Cache the registers that each step needs."""
