@@ -225,7 +225,21 @@ class PoliciesShow:
         elif self.path.suffix in POLICY_FILES:
             _show(self.path, self.learner)
         else:
-            _list(self.path)
+            table = Table("file", "env", "learner", "steps", "seed", box=None)
+            for path in sorted(self.path.rglob("*.safetensors")):
+                name = str(path.relative_to(self.path))
+                try:
+                    lines = origin_of(load_any_policy(path).card)
+                except ShapechangerError as error:
+                    table.add_row(name, str(error))
+                    continue
+                table.add_row(name, *(lines[each] for each in ("env", "learner", "steps", "seed")))
+            if not table.rows:
+                raise StudyError(
+                    f"There is no policy in {self.path}: train one, name another folder, or give "
+                    "--references for the shipped policies."
+                )
+            print_table(table)
 
 
 def _show(file: Path, learner: str) -> None:
@@ -261,24 +275,6 @@ def origin_of(card: PolicyCard) -> dict[str, str]:
         "seed": str(card.seed),
         "version": card.version,
     }
-
-
-def _list(folder: Path) -> None:
-    table = Table("file", "env", "learner", "steps", "seed", box=None)
-    for path in sorted(folder.rglob("*.safetensors")):
-        name = str(path.relative_to(folder))
-        try:
-            lines = origin_of(load_any_policy(path).card)
-        except ShapechangerError as error:
-            table.add_row(name, str(error))
-            continue
-        table.add_row(name, *(lines[each] for each in ("env", "learner", "steps", "seed")))
-    if not table.rows:
-        raise StudyError(
-            f"There is no policy in {folder}: train one, name another folder, or give --references "
-            "for the shipped policies."
-        )
-    print_table(table)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -139,7 +139,7 @@ def _computer(robot: StandingRobot) -> Checks:
 
 def _wiring(robot: StandingRobot) -> Checks:
     profile = robot.profile
-    if driven_pins(profile) or _servo_enables(profile):
+    if driven_pins(profile) or any(one["output_enable"] != -1 for one in _boards(profile)):
         yield "resistors", _resistors(robot)
     if robot.has_pins and profile.stop_pin is not None:
         yield "emergency button", _button(robot, profile.stop_pin)
@@ -246,10 +246,6 @@ def _boards(guard: GuardPlan) -> list[dict[str, Any]]:
     return [one.settings for one in guard.outputs if one.settings.get("over") == "pca9685"]
 
 
-def _servo_enables(guard: GuardPlan) -> list[int]:
-    return sorted({one["output_enable"] for one in _boards(guard)} - {-1})
-
-
 def _resistors(robot: StandingRobot) -> Results:
     """Check the resistors that keep outputs off while no program holds their pins.
 
@@ -264,7 +260,8 @@ def _resistors(robot: StandingRobot) -> Results:
     down = ("down", "high", "ground, because it may run while no program holds the pin")
     up = ("up", "low", "3.3 V, because the board sends pulses while no program holds it")
     pins = [(pin, use, 0, *down) for pin, use in driven_pins(robot.profile).items()]
-    pins += [(pin, "OE of the servo board", 1, *up) for pin in _servo_enables(robot.profile)]
+    enables = sorted({one["output_enable"] for one in _boards(robot.profile)} - {-1})
+    pins += [(pin, "OE of the servo board", 1, *up) for pin in enables]
     for pin, use, rest, pull, wrong, remedy in pins:
         level = outside_level(pin, robot.pins)
         problem = f"has no pull-{pull}" if level is None else f"is held {wrong}"

@@ -119,7 +119,16 @@ class PinBoard:
                 if self._switches_rig:
                     self._rig.set_power(on=self._wiring.has_power(self.levels, now_ns))
                 self._rig.advance(min(now_ns - start_ns, _MAX_SERVO_STEP_NS))
-            self.world.advance((now_ns - start_ns) / 1e9, self._parts())
+            # The value of each part of the vehicle is the mean of the outputs that move it.
+            values: dict[str, list[float]] = {}
+            for name, (value, _) in self._wiring.read(self.levels, start_ns).items():
+                shares = values.setdefault(self._wiring.outputs[name].part, [])
+                if name in self._obeys:
+                    value = self._obeys[name](value, start_ns)
+                if value is not None:
+                    shares.append(value)
+            parts = {part: sum(got) / len(got) if got else None for part, got in values.items()}
+            self.world.advance((now_ns - start_ns) / 1e9, parts)
             self._now_ns = now_ns
         seen = self.world.inputs()
         edges = [e for one in self._sensors for e in one.edges(start_ns, self._now_ns, seen)]
@@ -232,17 +241,6 @@ class PinBoard:
                 duty = float((caller.t - claim.phase_ns) % period_ns < duty * period_ns)
             claim.hz = 0
             self._drive(caller, pin, duty)
-
-    def _parts(self) -> dict[str, float | None]:
-        """Return the value of each part of the vehicle: the mean of the outputs that move it."""
-        values: dict[str, list[float]] = {}
-        for name, (value, _) in self._wiring.read(self.levels, self._now_ns).items():
-            shares = values.setdefault(self._wiring.outputs[name].part, [])
-            if name in self._obeys:
-                value = self._obeys[name](value, self._now_ns)
-            if value is not None:
-                shares.append(value)
-        return {part: sum(got) / len(got) if got else None for part, got in values.items()}
 
     def _update_channels(self, at: tuple[int, int], chip: SimulatedChip) -> list[tuple[int, Pulse]]:
         """Update the levels of a chip's channels and return those that changed."""
