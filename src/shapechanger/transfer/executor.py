@@ -190,7 +190,14 @@ class Processes(Executor):
         self._busy: dict[Connection, tuple[BaseProcess, str]] = {}
 
     def _begin(self, job: Job) -> None:
-        connection, process = self._idle.popitem() if self._idle else _worker()
+        if self._idle:
+            connection, process = self._idle.popitem()
+        else:
+            context = multiprocessing.get_context("spawn")
+            connection, theirs = context.Pipe()
+            process = context.Process(target=_serve, args=(theirs,), daemon=True)
+            process.start()
+            theirs.close()
         self._busy[connection] = process, job.name
         with suppress(ConnectionError):  # `_events` reports a process that has ended.
             connection.send((job.function, job.arguments))
@@ -215,15 +222,6 @@ class Processes(Executor):
         for connection, process in (self._idle | busy).items():
             _end(connection, process)
         self._idle, self._busy = {}, {}
-
-
-def _worker() -> tuple[Connection, BaseProcess]:
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(theirs,), daemon=True)
-    process.start()
-    theirs.close()
-    return ours, process
 
 
 def _end(connection: Connection, process: BaseProcess) -> int | None:

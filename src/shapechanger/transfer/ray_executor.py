@@ -44,8 +44,18 @@ class RayCluster(Executor):
     def _open(self, on_progress: OnProgress) -> None:
         self._is_own = not _ray.is_initialized()
         if self._is_own:
-            if self._address not in (None, "auto", "local"):
-                _require_answer(str(self._address))
+            if self._address is not None and self._address not in ("auto", "local"):
+                host, colon, port = self._address.rpartition(":")
+                if not colon or not port.isdigit() or "/" in host:
+                    raise StudyError(
+                        "The address of a Ray cluster must be HOST:PORT or auto, got "
+                        f"{self._address!r}."
+                    )
+                place = host.strip("[]"), int(port)
+                try:  # Where nothing listens, Ray would retry for 30 s.
+                    socket.create_connection(place, timeout=_CONNECT_S).close()
+                except (OSError, OverflowError) as error:
+                    raise _no_answer(self._address, "nothing listens there") from error
             try:
                 _ray.init(address=self._address, logging_level="ERROR", log_to_driver=False)
             except (ConnectionError, ValueError, RuntimeError, RayError) as error:
@@ -81,19 +91,6 @@ class RayCluster(Executor):
             _ray.cancel(task, force=True)
         if self._is_own:
             _ray.shutdown()
-
-
-def _require_answer(address: str) -> None:
-    """Refuse an address that is malformed, or where nothing listens: Ray would retry for 30 s."""
-    host, colon, port = address.rpartition(":")
-    if not colon or not port.isdigit() or "/" in host:
-        raise StudyError(
-            f"The address of a Ray cluster must be HOST:PORT or auto, got {address!r}."
-        )
-    try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECT_S).close()
-    except (OSError, OverflowError) as error:
-        raise _no_answer(address, "nothing listens there") from error
 
 
 def _no_answer(address: str, reason: str) -> StudyError:

@@ -229,7 +229,8 @@ def make_plan(
                     "own policy there, as randomised and identified do."
                 )
             own_steps = settings.whole_updates(own_steps)
-        source_budget, digest = origin.steps, _digest(source_policy)
+        source_budget = origin.steps
+        digest = hashlib.sha256(source_policy.read_bytes()).hexdigest()
     one, other = traits.source, traits.target
     seen = one.observation_layout, other.observation_layout
     layouts = (*seen, one.action_layout, other.action_layout)
@@ -314,7 +315,8 @@ def run_study(
         CorruptStudy: If a file in `out` cannot be read.
         FailedRuns: If runs have failed; all runs that do not depend on them have ended.
     """
-    if (_digest(source_policy) if source_policy else "") != plan.source_policy:
+    digest = hashlib.sha256(source_policy.read_bytes()).hexdigest() if source_policy else ""
+    if digest != plan.source_policy:
         raise StudyError("The source policy is not the policy that the plan names.")
     traits = inspect_task(plan.task) if traits is None else traits
     claim_folder(plan, out)
@@ -391,10 +393,6 @@ def claim_folder(plan: Plan, out: Path) -> None:
     elif found != plan:
         text = changes_between(found, plan) or f"it differs in {plan.difference(found)}"
         raise ForeignStudy(f"{out} holds another study ({text}): {_KEPT}.")
-
-
-def _digest(policy: Path) -> str:
-    return hashlib.sha256(policy.read_bytes()).hexdigest()
 
 
 def _summaries(study: Study) -> dict[str, Summary]:

@@ -258,7 +258,7 @@ def build_model(
     made = _load(settings.algorithm)
     arguments = dict(settings.model_arguments)
     try:
-        if _is_class(made):
+        if isinstance(made, type) and issubclass(made, BaseAlgorithm):
             arguments.setdefault("policy_kwargs", {"net_arch": list(settings.net_arch)})
             arguments |= {"seed": seed, "device": "cpu", "tensorboard_log": tensorboard}
             policy: Any = settings.policy_class
@@ -278,10 +278,6 @@ def build_model(
     return model
 
 
-def _is_class(algorithm: object) -> bool:
-    return isinstance(algorithm, type) and issubclass(algorithm, BaseAlgorithm)
-
-
 def require_class(algorithm: str) -> None:
     """Refuse an algorithm that is not a class of models, or whose module must not be imported."""
     module = algorithm.partition(":")[0]
@@ -291,14 +287,15 @@ def require_class(algorithm: str) -> None:
             f"A policy of {algorithm} needs the module {module}, which a file may not import: "
             f"name it too, as load_policy(path, {algorithm!r}) or --learner {algorithm}."
         )
-    if not _is_class(_load(algorithm)):
+    made = _load(algorithm)
+    if not (isinstance(made, type) and issubclass(made, BaseAlgorithm)):
         raise ValueError(f"its algorithm {algorithm} is a function, which a file may not call")
 
 
 def checked_settings(settings: ImportedSettings) -> ImportedSettings:
     """Import an algorithm, check the names of its arguments, and set `steps_per_update`."""
     made = _load(settings.algorithm)
-    if not callable(made) or (isinstance(made, type) and not _is_class(made)):
+    if not callable(made) or (isinstance(made, type) and not issubclass(made, BaseAlgorithm)):
         raise StudyError(
             f"{settings.algorithm} is neither a class of models nor a function that builds one."
         )

@@ -92,7 +92,13 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Lear
     if learner.endswith(".toml"):
         return _read_learner(Path(learner), changed)
     if ":" in learner:
-        return learner, _imported(learner, changed)
+        from shapechanger.transfer.learners.policy_file import checked_settings  # Imports PyTorch.
+
+        ours = {field.name for field in msgspec.structs.fields(ImportedSettings)}
+        values = {name: value for name, value in changed.items() if name in ours}
+        values["arguments"] = {n: value for n, value in changed.items() if n not in ours}
+        values = {"algorithm": learner, **values}
+        return learner, checked_settings(_converted(learner, ImportedSettings, values))
     if learner not in LEARNERS and learner in KINDS.added():
         return learner, _converted(learner, KINDS.load(learner), dict(changed))
     settings = learner_settings(learner)
@@ -116,17 +122,6 @@ def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, LearnerS
     except (StudyError, UnknownName) as error:
         raise StudyError(f"{path}{place_of(text, error)}: {error}") from error
     return path.stem, settings
-
-
-def _imported(algorithm: str, changed: Mapping[str, Any]) -> ImportedSettings:
-    from shapechanger.transfer.learners.policy_file import checked_settings  # Imports PyTorch.
-
-    ours = {field.name for field in msgspec.structs.fields(ImportedSettings)}
-    own = {name: value for name, value in changed.items() if name in ours}
-    own["arguments"] = {name: value for name, value in changed.items() if name not in ours}
-    return checked_settings(
-        _converted(algorithm, ImportedSettings, {"algorithm": algorithm, **own})
-    )
 
 
 def _converted(name: str, kind: type[_Kind], values: dict[str, Any]) -> _Kind:

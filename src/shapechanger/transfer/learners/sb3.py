@@ -200,14 +200,18 @@ class Sb3Learner(Learner[Sb3Settings]):
             # The source's critic predicts returns that are normalised by these statistics.
             envs.ret_rms = start.normalisation.reward.copy()
         model = self._moved(start, envs, card, body_map)
-        return model, _explore(model, card.settings)
-
-    @property
-    def _logs(self) -> str | None:
-        return None if self.tensorboard is None else str(self.tensorboard)
+        if not isinstance(model.policy, ActorCriticPolicy):
+            return model, None
+        # Raise small deviations, so that the policy explores.
+        log_std: torch.Tensor = model.policy.log_std
+        least = min(START_LOG_STD, getattr(card.settings, "log_std_init", START_LOG_STD))
+        with torch.no_grad():
+            log_std.clamp_(min=least)
+        return model, tuple(map(float, log_std.detach().numpy()))
 
     def _new_model(self, envs: VecEnv, card: PolicyCard) -> BaseAlgorithm:
-        return build_model(card.settings.for_model(), envs, card.seed, self._logs)
+        logs = None if self.tensorboard is None else str(self.tensorboard)
+        return build_model(card.settings.for_model(), envs, card.seed, logs)
 
     def _moved(
         self, source: TrainedPolicy, envs: VecEnv, card: PolicyCard, body_map: BodyMap
@@ -221,7 +225,7 @@ class Sb3Learner(Learner[Sb3Settings]):
             normalisation=None if statistics is None else statistics.observation,
             seed=card.seed,
             device="cpu",
-            tensorboard_log=self._logs,
+            tensorboard_log=None if self.tensorboard is None else str(self.tensorboard),
             **{name: value for name, value in arguments.items() if name != "policy_kwargs"},
         )
 
@@ -232,16 +236,6 @@ class Sb3Learner(Learner[Sb3Settings]):
                 f"{self.name} diverged after {model.num_timesteps} steps: its weights are not "
                 "finite. Try a smaller learning rate, or change the body less."
             )
-
-
-def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] | None:
-    """Raise small deviations; return their logarithms, or None if the policy has no `log_std`."""
-    if not isinstance(model.policy, ActorCriticPolicy):
-        return None
-    log_std: torch.Tensor = model.policy.log_std
-    with torch.no_grad():
-        log_std.clamp_(min=min(START_LOG_STD, getattr(settings, "log_std_init", START_LOG_STD)))
-    return tuple(map(float, log_std.detach().numpy()))
 
 
 def statistics_of(envs: VecEnv) -> Normalisation | None:

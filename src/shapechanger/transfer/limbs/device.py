@@ -31,9 +31,16 @@ class DeviceRows:
         self._apart = isinstance(envs.single_action_space, gym.spaces.Tuple)
         # Worlds of a batch have arrays of the same shapes, with features in the same order.
         self._batches: list[tuple[Tensor, LimbRows]] = []
+        floats = ("scale", "offset", "selection", "constant", "low", "high")
         for batch in envs.batches:
+            device = batch.numbers.device
             rows = LimbRows.stacked([each[int(i)] for i in batch.numbers.tolist()])
-            self._batches.append((batch.numbers, _on_device(rows, batch.numbers.device)))
+            tensors: dict[str, Any] = {
+                name: torch.as_tensor(getattr(rows, name), dtype=torch.float32, device=device)
+                for name in floats
+            }
+            tensors["actuators"] = torch.as_tensor(rows.actuators, device=device)
+            self._batches.append((batch.numbers, replace(rows, **tensors)))
 
     def of(self, observations: Any) -> Tensor:
         """Return the rows of all worlds, flattened, shape (n, (room + 1) * width)."""
@@ -54,16 +61,6 @@ class DeviceRows:
         for (numbers, _), part in zip(self._batches, parts, strict=True):
             whole[numbers] = part
         return whole
-
-
-def _on_device(rows: LimbRows, device: Any) -> LimbRows:
-    floats = ("scale", "offset", "selection", "constant", "low", "high")
-    tensors: dict[str, Any] = {
-        name: torch.as_tensor(getattr(rows, name), dtype=torch.float32, device=device)
-        for name in floats
-    }
-    tensors["actuators"] = torch.as_tensor(rows.actuators, device=device)
-    return replace(rows, **tensors)
 
 
 class LimbModel(MLPModel):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
 from contextlib import closing
 from typing import Any, Final
 
@@ -13,7 +12,6 @@ import numpy as np
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, EnvTraits, layouts_of
 from shapechanger.errors import StudyError
 from shapechanger.files import write_json
-from shapechanger.layout import Layout
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.body_map.rules import Copy, MapEntry
 from shapechanger.transfer.learners import LearnerSettings
@@ -88,28 +86,27 @@ class ShuffledMap(Method):
 
 
 def shuffle(body_map: BodyMap, rng: np.random.Generator) -> BodyMap:
-    """Return a body map with the same rules, whose copies of equal shape are exchanged randomly."""
-    return msgspec.structs.replace(
-        body_map,
-        observation=_shuffled(body_map.observation, body_map.source_observation, rng),
-        action=_shuffled(body_map.action, body_map.target_action, rng),
+    """Return a body map whose copies of features of equal shape are exchanged randomly.
+
+    Other rules stay in place.
+    """
+    sides = (
+        (body_map.observation, body_map.source_observation),
+        (body_map.action, body_map.target_action),
     )
-
-
-def _shuffled(
-    entries: Sequence[MapEntry], layout: Layout, rng: np.random.Generator
-) -> tuple[MapEntry, ...]:
-    """Exchange the copies of features of the same shape at random; other rules stay in place."""
-    places: dict[tuple[int, ...], list[int]] = {}
-    for i, entry in enumerate(entries):
-        if isinstance(entry.rule, Copy):
-            places.setdefault(layout[entry.feature].shape, []).append(i)
-    result = list(entries)
-    for exchangeable in places.values():
-        order: list[int] = rng.permutation(exchangeable).tolist()
-        for place, taken in zip(exchangeable, order, strict=True):
-            result[place] = MapEntry(entries[place].feature, entries[taken].rule, "shuffled")
-    return tuple(result)
+    shuffled: list[tuple[MapEntry, ...]] = []
+    for entries, layout in sides:
+        places: dict[tuple[int, ...], list[int]] = {}
+        for i, entry in enumerate(entries):
+            if isinstance(entry.rule, Copy):
+                places.setdefault(layout[entry.feature].shape, []).append(i)
+        result = list(entries)
+        for exchangeable in places.values():
+            order: list[int] = rng.permutation(exchangeable).tolist()
+            for place, taken in zip(exchangeable, order, strict=True):
+                result[place] = MapEntry(entries[place].feature, entries[taken].rule, "shuffled")
+        shuffled.append(tuple(result))
+    return msgspec.structs.replace(body_map, observation=shuffled[0], action=shuffled[1])
 
 
 BODIES: Final = 32

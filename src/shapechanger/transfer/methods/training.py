@@ -382,14 +382,20 @@ class _Correction(BaseCallback):
         self._of_target = ReplayBuffer(self._run.steps, *spaces, device="cpu")
 
     def _on_step(self) -> bool:
-        run = self._run
+        run, model = self._run, cast("Any", self.model)
         # Target steps are spread evenly over the source steps.
         due = min(run.steps, self.num_timesteps * run.steps // run.source_steps)
         while self._steps < due:
             self._evaluate_if_due()
-            self._act()
+            action, _ = model.predict(self._seen)
+            scale = ActionScale.between(model.action_space, self._action)
+            then, reward, terminated, truncated, _ = self._env.step(scale.to_env(action))
+            ends = np.array([reward]), np.array([terminated])
+            scaled = model.policy.scale_action(action)
+            self._of_target.add(np.asarray(self._seen), np.asarray(then), scaled, *ends, [{}])
+            self._steps += 1
+            self._seen = self._env.reset()[0] if terminated or truncated else then
         if self.n_calls % _CLASSIFY_EVERY == 0 and self._of_target.size() >= _BATCH:
-            model = cast("Any", self.model)
             batches = (
                 ReplayBuffer.sample(model.replay_buffer, _BATCH),
                 self._of_target.sample(_BATCH),
@@ -402,17 +408,6 @@ class _Correction(BaseCallback):
 
     def _on_training_end(self) -> None:
         self._evaluate_if_due(last=True)
-
-    def _act(self) -> None:
-        model = cast("Any", self.model)
-        action, _ = model.predict(self._seen)
-        scale = ActionScale.between(model.action_space, self._action)
-        then, reward, terminated, truncated, _ = self._env.step(scale.to_env(action))
-        ends = np.array([reward]), np.array([terminated])
-        scaled = model.policy.scale_action(action)
-        self._of_target.add(np.asarray(self._seen), np.asarray(then), scaled, *ends, [{}])
-        self._steps += 1
-        self._seen = self._env.reset()[0] if terminated or truncated else then
 
     def _evaluate_if_due(self, *, last: bool = False) -> None:
         """Evaluate on the target, at the same steps as scratch."""

@@ -78,6 +78,14 @@ def learning_curves(study: Study, *countings: Counting) -> dict[Counting, str]:
     # Imported here, because `charts` reports the extra that is missing.
     from matplotlib.ticker import EngFormatter, FuncFormatter, MaxNLocator
 
+    # The y axis shows every run; intervals are clipped.
+    returns: NDArray[np.float64] = np.concatenate(
+        [study.curves(arm).returns.ravel() for arm in study.plan.arms]
+        + [np.array([next(iter(study.summaries.values())).reference.zero])]
+    )
+    low, high = float(returns.min()), float(returns.max())
+    margin = 0.15 * (high - low) or 0.1 * max(1.0, abs(high))
+
     def tick(value: float, place: int | None) -> str:
         return f"{value:,.10g}".replace("e+", "e")
 
@@ -85,7 +93,7 @@ def learning_curves(study: Study, *countings: Counting) -> dict[Counting, str]:
         _draw_arms(axes, study, float(study.plan.source_steps) if counting == "total" else 0.0)
         axes.set_xlabel("Target steps" if counting == "target" else "Source and target steps")
         axes.set_ylabel(_axis_label(study))
-        axes.set_ylim(*_return_limits(study))
+        axes.set_ylim(low - margin, high + margin)
         axes.xaxis.set_major_formatter(EngFormatter(sep="\N{THIN SPACE}"))
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.yaxis.set_major_formatter(FuncFormatter(tick))
@@ -172,17 +180,6 @@ def _add_legend(figure: Figure, columns: int) -> None:
 def _axis_label(study: Study) -> str:
     unit = "" if study.plan.unit == "1" else f", {study.plan.unit}"
     return f"{study.plan.measure.capitalize()} on the target{unit}"
-
-
-def _return_limits(study: Study) -> tuple[float, float]:
-    """Return limits of the y axis that contain every run; intervals are clipped."""
-    returns: NDArray[np.float64] = np.concatenate(
-        [study.curves(arm).returns.ravel() for arm in study.plan.arms]
-        + [np.array([next(iter(study.summaries.values())).reference.zero])]
-    )
-    low, high = float(returns.min()), float(returns.max())
-    margin = 0.15 * (high - low) or 0.1 * max(1.0, abs(high))
-    return low - margin, high + margin
 
 
 def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
