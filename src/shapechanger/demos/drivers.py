@@ -99,7 +99,10 @@ class Pilot:
 
     def _change(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> str:
         """Change the driver if it is time; return the reason, or "" without a change."""
-        gap, danger = self._gap(wanted, right), self._danger(wanted)
+        # The largest difference of the two actions that is not slowness.
+        slowest = np.where(np.isnan(self._rests), right, self._rests)
+        agreed = np.clip(wanted, np.minimum(slowest, right), np.maximum(slowest, right))
+        gap, danger = float(np.abs(wanted - agreed).max()), self._danger(wanted)
         if self._corrects:
             is_time, least_s = gap <= _AGREE and not danger, _AGREE_S
         else:
@@ -112,12 +115,6 @@ class Pilot:
         if not self._corrects:
             return "the policy drives on"
         return f"the expert takes over: {danger or f'the policy is off by {gap:.1f}'}"
-
-    def _gap(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> float:
-        """Return the largest difference of two actions that is not slowness."""
-        slowest = np.where(np.isnan(self._rests), right, self._rests)
-        agreed = np.clip(wanted, np.minimum(slowest, right), np.maximum(slowest, right))
-        return float(np.abs(wanted - agreed).max())
 
     def _danger(self, action: NDArray[np.float32]) -> str:
         """Describe the danger of an action in the env's world; "" without danger."""

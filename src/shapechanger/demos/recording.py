@@ -184,14 +184,16 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             "image_size": picture_size(self._jpeg, "from the env") if self._jpeg else None,
             "control_hz": float(self.env.metadata.get("render_fps") or 20.0),
             "env": spec.id if spec else "",
-            "env_kwargs": _plain(kwargs),
+            # Values that JSON lacks become their `str`.
+            "env_kwargs": json.loads(json.dumps(kwargs, default=str)),
             "driver": self._by_default,
             "clock": getattr(inner, "record_clock", "none") if has_clock else "none",
             "seed": seed,
             **self._about,
         }
         if options:
-            fields["notes"] = {**fields.get("notes", {}), "reset_options": _plain(options)}
+            plain = json.loads(json.dumps(dict(options), default=str))
+            fields["notes"] = {**fields.get("notes", {}), "reset_options": plain}
         self._header = EpisodeHeader(**fields)
         return observation, info
 
@@ -305,8 +307,3 @@ def _outcome(step: Step, info: Mapping[str, Any]) -> str:
     if step.terms.get("reward_collision", 0.0) < 0.0:
         return "collision"
     return "success" if info.get("is_success") else "terminated"
-
-
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values for JSON; unsupported ones become their `str`."""
-    return cast("dict[str, Any]", json.loads(json.dumps(dict(values), default=str)))

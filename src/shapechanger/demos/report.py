@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from itertools import accumulate, groupby, pairwise
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -12,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import DRIVERS, Episode, Step
+from shapechanger.demos.episodes import DRIVERS, Episode
 from shapechanger.demos.jpeg import COLOURS, decode_picture, encode_picture
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
@@ -123,8 +124,9 @@ def _timeline(episode: Episode) -> dict[str, Any]:
     """Return the runs of each driver, and points, -1 to 1, of the first four actions over time."""
     layout, first = episode.header.action_layout, episode.steps[0].index
     runs: list[tuple[int, int, str]] = []
-    for who, run in groupby(episode.steps, lambda step: _who(episode, step)):
-        indexes = [step.index for step in run]
+    whose = ("dropped" if s.index in episode.excluded else s.driver for s in episode.steps)
+    for who, run in groupby(zip(whose, episode.steps, strict=True), lambda pair: pair[0]):
+        indexes = [step.index for _, step in run]
         runs.append((indexes[0], indexes[-1], who))
     drawn = episode.steps[:: math.ceil(len(episode.steps) / _MAX_POINTS)]
     bounds = np.abs([layout.low, layout.high])
@@ -143,10 +145,6 @@ def _timeline(episode: Episode) -> dict[str, Any]:
     }
 
 
-def _who(episode: Episode, step: Step) -> str:
-    return "dropped" if step.index in episode.excluded else step.driver
-
-
 def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
     """Return up to `most` evenly spaced images of an episode, and those at the first marks."""
     # Time at which each step starts, s.
@@ -155,26 +153,23 @@ def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
     places = np.linspace(0, len(seen) - 1, min(most, len(seen))).round().astype(int).tolist()
     marks = {mark.step: mark.text or "marked" for mark in episode.marks}
     marked = [n for n, (step, _) in enumerate(seen) if step.index in marks]
-    return [
-        {
-            "step": step.index,
-            "seconds": at_s,
-            "driver": step.driver,
-            "who": _who(episode, step),
-            "why": episode.excluded.get(step.index, ""),
-            "source": _thumbnail(episode, step),
-            "mark": marks.get(step.index, ""),
-        }
-        for step, at_s in (seen[n] for n in sorted({*places, *marked[:_MAX_MARKED]}))
-    ]
-
-
-def _thumbnail(episode: Episode, step: Step) -> str:
-    """Return an image as a data URI, or "" if the image is damaged."""
-    try:
-        jpeg = episode.jpeg(step) or b""
-        picture = decode_picture(jpeg, step.frame)
-    except DemosError:  # The page marks it as damaged and shows the rest of the episode.
-        return ""
-    times = -(-picture.shape[1] // _MAX_WIDTH)
-    return jpeg_uri(encode_picture(picture[::times, ::times], 85) if times > 1 else jpeg)
+    frames: list[dict[str, Any]] = []
+    for step, at_s in (seen[n] for n in sorted({*places, *marked[:_MAX_MARKED]})):
+        source = ""
+        with suppress(DemosError):  # The page marks it as damaged and shows the rest.
+            jpeg = episode.jpeg(step) or b""
+            picture = decode_picture(jpeg, step.frame)
+            times = -(-picture.shape[1] // _MAX_WIDTH)
+            source = jpeg_uri(encode_picture(picture[::times, ::times], 85) if times > 1 else jpeg)
+        frames.append(
+            {
+                "step": step.index,
+                "seconds": at_s,
+                "driver": step.driver,
+                "who": "dropped" if step.index in episode.excluded else step.driver,
+                "why": episode.excluded.get(step.index, ""),
+                "source": source,
+                "mark": marks.get(step.index, ""),
+            }
+        )
+    return frames

@@ -125,10 +125,6 @@ class _Several(nn.ModuleList):
         return torch.cat([one(x) for one in self], dim=1)
 
 
-def _one_or_several(parts: Sequence[nn.Module]) -> nn.Module | None:
-    return _Several(parts) if len(parts) > 1 else next(iter(parts), None)
-
-
 class CameraNetwork(nn.Module):
     """Network of a clone: encoders and output layer, as the card describes them."""
 
@@ -139,7 +135,10 @@ class CameraNetwork(nn.Module):
         self.felt = 0 if feels is None else net.members * net.nerves[-1]
         eyes = [Eyes(net) for _ in range(net.members) if self.seen]
         nerves = [Nerves(feels.size, net.nerves) for _ in range(net.members) if feels is not None]
-        self.eyes, self.nerves = _one_or_several(eyes), _one_or_several(nerves)
+        self.eyes, self.nerves = (
+            _Several(parts) if len(parts) > 1 else next(iter(parts), None)
+            for parts in (eyes, nerves)
+        )
         self.hands = nn.Linear(self.seen + self.felt, len(net.classes) or card.action_size)
         self.activation = nn.Softmax(dim=1) if net.classes else nn.Tanh()
         # Colours last in memory: convolutions of a single image are a third faster.

@@ -73,8 +73,15 @@ def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
     header, steps, channels = episode.header, 0, dict[str, int]()
     layouts = {"state": header.state_layout} if header.state_layout else {}
     layouts |= dict.fromkeys(("action", "applied", "wanted"), header.action_layout)
-    schemas = {topic: _properties(layout) for topic, layout in layouts.items()} | _SCHEMAS
-    for topic, properties in schemas.items():
+    schemas: dict[str, dict[str, Any]] = {}
+    for topic, layout in layouts.items():
+        schemas[topic] = {}
+        for feature in layout:
+            ends = ("" if math.isinf(end) else f"{end:g}" for end in (feature.low, feature.high))
+            about = {"description": f"[{feature.unit}] {' to '.join(ends)}".rstrip()}
+            kind = {"type": "array", "items": _NUMBER} if feature.shape else _NUMBER
+            schemas[topic][feature.name] = about | kind
+    for topic, properties in (schemas | _SCHEMAS).items():
         schema = {"title": _KINDS[topic], "type": "object", "properties": properties}
         text = json.dumps(schema).encode()
         number = writer.register_schema(_KINDS[topic], "jsonschema", text)
@@ -106,7 +113,10 @@ def _messages(
         yield "camera", about | {"data": base64.b64encode(record.jpeg).decode()}
     for topic, layout in layouts.items():
         if (values := getattr(step, topic)) is not None:
-            yield topic, _by_name(layout, values)
+            parts = {n: list(map(_known, values[place])) for n, place in layout.slices.items()}
+            named = {f.name: parts[f.name] if f.shape else parts[f.name][0] for f in layout}
+            # A single number that is not finite is left out.
+            yield topic, {name: part for name, part in named.items() if part is not None}
     if step.reward is not None:
         terms = {name: _known(value) for name, value in step.terms.items()}
         yield "reward", {"reward": _known(step.reward), "terms": terms}
@@ -114,24 +124,6 @@ def _messages(
     plain |= {"terminated": step.terminated, "truncated": step.truncated}
     plain |= {"marks": record.marks} if record.marks else {}
     yield "step", plain | ({} if record.dropped is None else {"dropped": record.dropped})
-
-
-def _properties(layout: Layout) -> dict[str, Any]:
-    """Return the JSON schema of each feature, which describes its unit and range."""
-    found: dict[str, Any] = {}
-    for feature in layout:
-        ends = ("" if math.isinf(end) else f"{end:g}" for end in (feature.low, feature.high))
-        about = {"description": f"[{feature.unit}] {' to '.join(ends)}".rstrip()}
-        kind = {"type": "array", "items": _NUMBER} if feature.shape else _NUMBER
-        found[feature.name] = about | kind
-    return found
-
-
-def _by_name(layout: Layout, values: Sequence[float]) -> dict[str, Any]:
-    """Return values, keyed by name of the feature, without single numbers that are not finite."""
-    parts = {name: list(map(_known, values[place])) for name, place in layout.slices.items()}
-    named = {f.name: parts[f.name] if f.shape else parts[f.name][0] for f in layout}
-    return {name: part for name, part in named.items() if part is not None}
 
 
 def _known(value: float) -> float | None:

@@ -27,7 +27,6 @@ import gymnasium as gym
 import msgspec
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange import base, files
@@ -288,19 +287,18 @@ class _Dataset:
         record.marks, record.dropped = rest.marks, rest.dropped
         for name in self._images:
             record.frame, stored = int(row.get(_FRAME, number)), row[name]
-            record.image = _last_colours(stored) if np.ndim(stored) > 1 else bytes(stored)
+            if np.ndim(stored) > 1:
+                pixels = np.atleast_3d(stored)
+                # Colours come last, and there are three.
+                pixels = pixels if pixels.shape[-1] in {1, 3} else np.moveaxis(pixels, 0, -1)
+                record.image = np.repeat(pixels, 3 // pixels.shape[-1], -1)
+            else:
+                record.image = bytes(stored)
         return record
 
 
 def _numbers(row: Mapping[str, Any], names: Iterable[str]) -> list[float]:
     return [value for name in names for value in np.ravel(row[name]).astype(float).tolist()]
-
-
-def _last_colours(stored: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return an image as three colours, shape (height, width, 3)."""
-    pixels = np.atleast_3d(stored)
-    pixels = pixels if pixels.shape[-1] in {1, 3} else np.moveaxis(pixels, 0, -1)
-    return np.repeat(pixels, 3 // pixels.shape[-1], -1)
 
 
 def _write(
