@@ -314,7 +314,8 @@ def drives(
         if 0 < missing < len(part):
             text = "some records lack a time: the times of its session are left out"
             context.report("warning", text, part[0].name)
-            _leave_out_times(part)
+            for record in part:
+                record.step = structs.replace(record.step, captured_ns=None)
         parts += [part] if part else []
     for part, hz in zip(parts, _rates(parts, context, stated_hz), strict=True):
         timed, starts = part[0].step.captured_ns is not None, [0]
@@ -336,11 +337,6 @@ def _passed_ns(one: ExchangeRecord, two: ExchangeRecord) -> int:
     return (two.step.captured_ns or 0) - (one.step.captured_ns or 0)
 
 
-def _leave_out_times(part: Iterable[ExchangeRecord]) -> None:
-    for record in part:
-        record.step = structs.replace(record.step, captured_ns=None)
-
-
 def _rates(
     parts: Sequence[list[ExchangeRecord]], context: ImportContext, stated_hz: float | None
 ) -> list[float]:
@@ -353,7 +349,8 @@ def _rates(
     about = f"{1e3 / (measured or inf):.4g} ms apart, {measured or 0.0:.4g} a second"
     if (hz := context.hz or stated_hz) is not None:
         if measured and not 1.0 / _RATE_RATIO < measured / hz < _RATE_RATIO:
-            _leave_out_times(chain(*parts))
+            for record in chain(*parts):
+                record.step = structs.replace(record.step, captured_ns=None)
             text = f"The records are {about}, not at {hz:g} Hz: their times are left out."
             context.report("warning" if context.hz is None else "note", text)
         return [hz] * len(parts)

@@ -16,7 +16,7 @@ import copy
 import json
 import math
 import re
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from itertools import chain
@@ -274,14 +274,16 @@ class _Dataset:
                     yield record
 
     def _record(self, row: Mapping[str, Any], number: int) -> base.ExchangeRecord:
-        (reward,) = _numbers(row, [_REWARD])
+        (reward,), action, state = (
+            [value for name in names for value in np.ravel(row[name]).astype(float).tolist()]
+            for names in ([_REWARD], self._action, self._state)
+        )
         fields: dict[str, Any] = {"driver": "expert", "truncated": bool(row[_TRUNCATED])}
         rest = _Rest(step=fields, marks=(), dropped=None)
         if self._own:
             rest = msgspec.json.decode(row[_STEP], type=_Rest)
         if "reward" in rest.step or not (self._own or math.isnan(reward)):
             rest.step["reward"] = reward
-        action, state = (_numbers(row, names) for names in (self._action, self._state))
         known = {"action": action, "state": state, "terminated": bool(row[_TERMINATED])}
         record = base.ExchangeRecord(step=Step.from_json(rest.step | known))
         record.marks, record.dropped = rest.marks, rest.dropped
@@ -295,10 +297,6 @@ class _Dataset:
             else:
                 record.image = bytes(stored)
         return record
-
-
-def _numbers(row: Mapping[str, Any], names: Iterable[str]) -> list[float]:
-    return [value for name in names for value in np.ravel(row[name]).astype(float).tolist()]
 
 
 def _write(
