@@ -15,6 +15,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -29,6 +30,10 @@ from benchmarks.row import Row, asked
 MODULES: Final = {
     "guard": "robot/guard",
     "link": "robot/link",
+    "limits": "contract/limits",
+    "library": "robot/daemon/library",
+    "process": "robot/daemon/process:GuardLink",  # The rest runs in a process of its own.
+    "waypoints": "vehicles/waypoints",
     "body_map": "transfer/body_map",
     "transplant": "transfer/transplant",
     "metrics": "transfer/metrics",
@@ -56,9 +61,14 @@ from the last complete run of its module.
 
 
 def mutants() -> Iterator[Row]:
-    """Yield the share of killed mutants of each module, and write the page of the survivors."""
+    """Yield the share of killed mutants of each module, and write the page of the survivors.
+
+    The row of a module that did not run completely has the numbers that the page shows.
+    """
     chosen = asked("module", MODULES)
-    patterns = [f"shapechanger.{MODULES[name].replace('/', '.')}*" for name in chosen]
+    patterns = [
+        f"shapechanger.{MODULES[name].replace('/', '.').replace(':', '.*')}*" for name in chosen
+    ]
     children = str(os.cpu_count() or 1)
     command = [sys.executable, "-m", "mutmut", "run", "--max-children", children, *patterns]
     shutil.rmtree(_FOLDER / "tests", ignore_errors=True)  # mutmut keeps tests that were deleted.
@@ -69,34 +79,35 @@ def mutants() -> Iterator[Row]:
     equivalent = {
         (one["function"], one["line"]) for one in tomllib.loads(_EQUIVALENT.read_text())["mutant"]
     }
-    before = _PAGE.read_text(encoding="utf-8").splitlines()
+    before = _PAGE.read_text(encoding="utf-8")
     page = [_INTRODUCTION, "| module | killed | survived | equivalent |\n| --- | --- | --- | --- |"]
     survivors: list[str] = []
-    for name in MODULES:
+    for name, place in MODULES.items():
         counts: Counter[str] = Counter()
         found: list[str] = []
-        metas = sorted((_SRC / MODULES[name]).rglob("*.py.meta")) if name in chosen else []
-        for path in metas:
+        for path in _metas(place.partition(":")[0]) if name in chosen else ():
             for function, line, status in _judged(path, equivalent):
-                counts[status] += 1
-                if status == "survived":
-                    found.append(f"- `{function}`: `{line}`")
-        killed, alive = counts["killed"], counts["survived"]
-        if counts["did not run"] or not killed + alive:
-            page += [line for line in before if line.startswith(f"| {name} |")]
-            survivors += [line for line in before if line.startswith(f"- `{MODULES[name]}")]
-            continue
+                if function.startswith(place):
+                    counts[status] += 1
+                    if status == "survived":
+                        found.append(f"- `{function}`: `{line}`")
+        ran = ""
+        if counts["did not run"] or not counts["killed"] + counts["survived"]:
+            numbers = re.search(rf"^\| {name} \| (\d+) of .* \| (\d+) \| (\d+) \|$", before, re.M)
+            if numbers is None:
+                continue
+            killed, alive, equal = map(int, numbers.groups())
+            found = re.findall(rf"^- `{place}.*$", before, re.M)
+            ran = ", from an earlier run"
+        else:
+            killed, alive, equal = counts["killed"], counts["survived"], counts["equivalent"]
         survivors += found
         share = killed / (killed + alive)
-        page.append(
-            f"| {name} | {killed} of {killed + alive} ({share:.1%}) | {alive} | "
-            f"{counts['equivalent']} |"
-        )
+        page.append(f"| {name} | {killed} of {killed + alive} ({share:.1%}) | {alive} | {equal} |")
         yield Row(
             f"mutants of {name}: killed",
             f"{share:.1%}",
-            f"{killed} of {killed + alive}; {counts['equivalent']} equivalent, "
-            f"{counts['not counted']} not counted",
+            f"{killed} of {killed + alive}; {equal} equivalent{ran}",
             f">= {_TARGET:.0%}",
             share >= _TARGET,
         )
@@ -104,27 +115,31 @@ def mutants() -> Iterator[Row]:
     _PAGE.write_text("\n".join(page) + "\n", encoding="utf-8")
 
 
+def _metas(place: str) -> list[Path]:
+    """Return the results of a file without its suffix, or of all files of a folder."""
+    return [*_SRC.glob(f"{place}.py.meta"), *sorted((_SRC / place).rglob("*.py.meta"))]
+
+
 def _judged(path: Path, equivalent: set[tuple[str, str]]) -> Iterator[tuple[str, str, str]]:
     """Yield function, changed line and status of each mutant of a file."""
     source = ast.parse(path.with_suffix("").read_text(encoding="utf-8"))
     functions = {n.name: n for n in ast.walk(source) if isinstance(n, ast.FunctionDef)}
     for key, code in json.loads(path.read_text())["exit_code_by_key"].items():
-        if code is None:
-            yield "", "", "did not run"
-            continue
         mangled = key.rpartition(".")[2]
         original = functions[mangled.rpartition("__mutmut_")[0] + "__mutmut_orig"]
         mutant = functions[mangled]
         module = path.relative_to(_SRC).with_suffix("").with_suffix("").as_posix()
         function = f"{module}:{_plain(mangled)}"
         line = _changed(original, mutant)
-        if code not in _ALIVE:
+        if code is None:
+            status = "did not run"
+        elif code not in _ALIVE:
             status = "killed"
         elif (function, line) in equivalent:
             status = "equivalent"
         else:
             status = "survived"
-        if _noticeable(original) == _noticeable(mutant):
+        if code is not None and _noticeable(original) == _noticeable(mutant):
             status = "not counted"
         yield function, line, status
 

@@ -232,18 +232,14 @@ def test_unmatched_features_get_otherwise() -> None:
 def test_units_are_not_mixed() -> None:
     sides = pendulum_observation(), pendulum_observation(unit="deg")
     motors = pendulum_action(), pendulum_action()
-    with pytest.raises(MapError, match=r"hinge/angle \[rad\] cannot copy .* hinge/angle \[deg\]"):
-        BodyMap.between(*sides, *motors)
-    built = BodyMap.between(
-        *sides,
-        *motors,
-        observation_rules={
-            "hinge/angle": Copy("hinge/angle", DEGREE),
-            "hinge/velocity": Copy("hinge/velocity", DEGREE),
-        },
-    )
-    sensed = built.adapt_observation([0.0, 180.0, 0.0, 90.0])
-    assert sensed[1] == pytest.approx(180 * DEGREE)
+    for unscaled in ({}, {"hinge/angle": Copy("hinge/angle", -1.0)}):
+        with pytest.raises(MapError, match=r"angle \[rad\] cannot copy .* hinge/angle \[deg\]"):
+            BodyMap.between(*sides, *motors, observation_rules=unscaled)
+    for scale in (DEGREE, -2.0):
+        scaled = {name: Copy(name, scale) for name in ("hinge/angle", "hinge/velocity")}
+        built = BodyMap.between(*sides, *motors, observation_rules=scaled)
+        sensed = built.adapt_observation([0.0, 180.0, 0.0, 90.0])
+        assert sensed[1] == pytest.approx(180 * scale)
 
 
 def test_blocks_of_different_shapes_do_not_match() -> None:

@@ -91,13 +91,13 @@ def test_commands_that_do_not_point_ahead_are_not_usable() -> None:
 
 @pytest.mark.parametrize("body", _BODIES)
 def test_the_response_is_fitted_to_a_drive(body: str) -> None:
-    """Steps with changing steering, in which the turn lags, and NaN are ignored."""
+    """Steps less than 0.1 s after a change of the steering, and NaN, are ignored."""
     rng = np.random.default_rng(0)
-    steering = np.repeat(rng.uniform(-0.6, 0.6, 60), 6)
-    speed = np.repeat(rng.uniform(0.5, 2.0, 60), 6)
+    steering, speed = np.repeat(rng.uniform((-0.6, 0.5), (0.6, 2.0), (120, 2)), 3, axis=0).T
     turn = steering * (_BODIES[body].per_metre * speed + _BODIES[body].per_second)
     yaw_rate = -turn + rng.normal(0.0, 0.02, len(turn))
-    lags = np.abs(steering - np.roll(steering, 1)) > 0.1
+    changes = np.abs(steering - np.roll(steering, 1)) > 0.1
+    lags = changes | np.roll(changes, 1)  # 0 and 0.05 s after a change.
     yaw_rate[lags] += 3.0 * rng.normal(size=lags.sum())
     yaw_rate[10] = np.nan
     found = fit_response(steering, speed, yaw_rate, np.arange(360) / 20.0)
