@@ -70,6 +70,8 @@ def test_closing_a_dead_connection_does_not_wait_for_it(run: Run, connect: Conne
     client = connect(robot, timeout_s=60.0)
     robot.silent = True
     client.close()
+    with pytest.raises(LinkError, match="The connection was closed: make a new one"):
+        client.take()
 
 
 @given(garbage=st.binary(max_size=100))

@@ -106,11 +106,13 @@ def test_the_lifeline_ends_when_the_daemon_is_killed(started: Started) -> None:
     assert poll.poll(20_000) == [(started.life, select.POLLHUP)]
 
 
-def test_sending_the_lifeline_to_a_closed_socket_raises_nothing() -> None:
+def test_sending_the_lifeline_to_a_closed_socket_leaves_no_file_open() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.close()
+    before = set(os.listdir("/proc/self/fd"))
     with theirs:
         send_lifeline(theirs.fileno())
+        assert set(os.listdir("/proc/self/fd")) == before
 
 
 def test_no_client_connects_before_the_first_state(begun: Started) -> None:

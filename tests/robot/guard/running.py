@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -40,10 +41,10 @@ class Robot:
         until(lambda: any(line["duty"] > 0.0 for line in self.record.pins()))
 
     def kill(self, opened: str, number: signal.Signals) -> int:
-        """Signal the first guard ("hardware") or daemon; return the time of the line before."""
-        before = self.record.lines()[-1]["t"]
-        os.kill(self.pids(opened)[0], number)
-        return before
+        """Signal the first guard ("hardware") or daemon; return the time just before, ns."""
+        pid, before_ns = self.pids(opened)[0], time.monotonic_ns()
+        os.kill(pid, number)
+        return before_ns
 
     def commands(self) -> list[int]:
         return [line["t"] for line in self.record.lines() if "command" in line]

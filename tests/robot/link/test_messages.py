@@ -24,10 +24,11 @@ def test_messages_round_trip(asked: messages.ClientMessage, answer: messages.Rob
 
 
 @pytest.mark.parametrize("side", DECODERS)
-@given(data=st.binary(max_size=300))
+@given(data=st.binary(max_size=300) | client_messages.map(encode) | robot_messages.map(encode))
 def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
     with contextlib.suppress(LinkError):
-        DECODERS[side](data)
+        again = encode(DECODERS[side](data))
+        assert encode(DECODERS[side](again)) == again
 
 
 @given(message=client_messages | robot_messages, data=st.data())

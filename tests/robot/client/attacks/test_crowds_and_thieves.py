@@ -74,12 +74,13 @@ def test_a_person_can_stop_a_robot_whose_connections_are_occupied(
 def test_a_slow_connection_ends_however_many_bytes_it_sends(
     scene: Scene, hold: Callable[[Scene, str], Stranger]
 ) -> None:
-    slow = [hold(scene, source) for source in ELSEWHERE]
+    held = slow = [hold(scene, source) for source in ELSEWHERE]
     while slow:
         for stranger in slow:
             stranger.write(b"x")
-        scene.operator.observe()
+        assert scene.operator.observe()["armed"]
         slow = [stranger for stranger in slow if stranger.is_open()]
+    assert not any(b"welcome" in stranger.unread for stranger in held)
 
 
 # Thieves of the key.
