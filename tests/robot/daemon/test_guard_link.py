@@ -1,6 +1,7 @@
 """The connection from the daemon to the guard."""
 
 import asyncio
+import re
 import socket
 from collections.abc import Iterator
 
@@ -43,27 +44,43 @@ def ends(runner: asyncio.Runner) -> Iterator[Ends]:
     ends.guard.close()
 
 
-async def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None:
+async def test_states_arrive_in_order_and_invalid_ones_are_skipped(
+    ends: Ends, caplog: pytest.LogCaptureFixture
+) -> None:
     ends.guard.send(encode(guard_state(at_ns=1)))
     ends.guard.send(b"nonsense")
+    ends.port.drain()
+    assert [state.at_ns for state in ends.states] == [1]
     ends.guard.send(b'{"at_ns": "3"}')
     ends.guard.send(encode(guard_state(at_ns=4)))
-    ends.port.drain()
-    assert [state.at_ns for state in ends.states] == [1, 4]
+    await until(lambda: [state.at_ns for state in ends.states] == [1, 4], "the states arrive")
+    said = "A message of the guard is not a state: .*"
+    assert [re.fullmatch(said, text) is not None for text in caplog.messages] == [True, True]
 
 
+@pytest.mark.parametrize("left", ["nothing", "an order", "stops that wait"])
 @pytest.mark.parametrize("reads_first", [True, False])
-async def test_a_lost_guard_is_reported_once(ends: Ends, reads_first: bool) -> None:
+async def test_a_lost_guard_is_reported_once(
+    ends: Ends, caplog: pytest.LogCaptureFixture, reads_first: bool, left: str
+) -> None:
+    for _ in range({"nothing": 0, "an order": 1}.get(left, 5_000)):
+        ends.port.send(Order(kind="disarm"))
+        ends.port.send(Order(kind="halt"))
+    caplog.clear()
     ends.guard.close()
+    if left == "stops that wait":
+        await until(lambda: ends.lost, "the loss is reported")
     for _ in range(2):
         if reads_first:
             ends.port.drain()
         ends.port.send(Order(kind="disarm"))
         ends.port.drain()
-    assert ends.lost == [True]
+    assert (ends.lost, caplog.messages) == ([True], [])
 
 
-async def test_a_full_socket_keeps_the_first_stops_and_drops_commands(ends: Ends) -> None:
+async def test_a_full_socket_keeps_the_first_stops_and_drops_commands(
+    ends: Ends, caplog: pytest.LogCaptureFixture
+) -> None:
     """A repeat does not replace a waiting stop, and nothing overtakes one."""
 
     def command(count: int) -> None:
@@ -89,3 +106,6 @@ async def test_a_full_socket_keeps_the_first_stops_and_drops_commands(ends: Ends
     await until(stopped, "the first stop of each kind has arrived, in order")
     assert {order.kind for order in received[:-3]} == {"command"}
     assert received[-4].seq < 4_999
+    # Once for each time that the guard did not read.
+    said = "The guard does not read: commands are dropped, and stops wait."
+    assert caplog.messages == [said, said]

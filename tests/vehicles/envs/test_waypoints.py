@@ -1,5 +1,7 @@
 """The waypoint env, steering responses, and certificates of shifts between vehicles."""
 
+import dataclasses
+import itertools
 import math
 import re
 from contextlib import closing
@@ -9,9 +11,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from shapechanger.envs.catalogue import WAYPOINT_ENVS
-from shapechanger.errors import EmptyShift, MorphologyError, ProfileError, StudyError
+from shapechanger.errors import EmptyShift, MorphologyError, ProfileError, SpaceMismatch, StudyError
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv
 from shapechanger.vehicles.waypoints import (
@@ -24,6 +27,7 @@ from shapechanger.vehicles.waypoints import (
     waypoints_of,
 )
 
+_TRACKS = SteeringResponse(0.1, 0.6)
 _COURSE = {"course": 2, "start": 2}
 _BLIND: dict[str, Any] = {"image": False, "put_back": True}
 
@@ -43,6 +47,26 @@ def test_steering_follows_from_the_bearing() -> None:
     assert _steering(car, 0.2, 2.0) == pytest.approx(_steering(car, 0.2, 1.0))
     assert _steering(tank, 0.2, 1.0) == pytest.approx(2.0 * _steering(tank, 0.2, 0.5))
     assert _steering(tank, 0.2, 1.0) == pytest.approx(2.0 * math.sin(0.2) / AHEAD_M / 4.0)
+
+
+@pytest.mark.parametrize("on_the_spot", [True, False])
+def test_the_throttle_leaves_room_for_the_tracks_to_turn(on_the_spot: bool) -> None:
+    """Each track has the sum or difference of throttle and steering, which must not saturate."""
+    for bearing, share in itertools.product((-4.0, -1.0, -0.3, 0.2, 3.0), (-3.0, -0.6, 0.9, 2.0)):
+        action = np.array((bearing, share))
+        steering, throttle = command(action, _TRACKS, 0.1, on_the_spot=on_the_spot)
+        turn = 2.0 * math.sin(np.clip(bearing, -1.0, 1.0)) / AHEAD_M
+        # A measured speed below 0.3 m/s counts as 0.3 m/s.
+        assert steering == pytest.approx(np.clip(turn * 0.3 / (0.3 * 0.1 + 0.6), -1.0, 1.0))
+        asked = np.clip(0.5 * (share + 1.0), 0.25, 1.0)
+        room = max(1.0 - abs(steering), 0.25) if on_the_spot else 1.0
+        assert throttle == pytest.approx(min(asked, room))
+
+
+@pytest.mark.parametrize("action", [(0.1,), (0.1, 0.2, 0.3), (np.nan, 0.0), (0.0, np.inf)])
+def test_a_waypoint_is_two_finite_numbers(action: tuple[float, ...]) -> None:
+    with pytest.raises(SpaceMismatch, match="must be two finite numbers, bearing and speed, got"):
+        command(np.array(action), _TRACKS, 1.0, on_the_spot=False)
 
 
 _BODIES = {"wheels": SteeringResponse(2.0, 0.0), "tracks": SteeringResponse(0.8, 3.1)}
@@ -137,6 +161,41 @@ def test_sensed_waypoints_need_geometry_and_sensors(
     path.write_text(re.sub(removed, "", text, flags=re.MULTILINE), encoding="utf-8")
     with pytest.raises(ProfileError, match=message):
         WaypointEnv("car", robot=path, sensed=True)
+
+
+class _Turning(gym.Env[Any, Any]):
+    """A vehicle that turns exactly as `_TRACKS`, but not in the first steps after a new command."""
+
+    def __init__(self) -> None:
+        self.metadata = {"render_fps": 20.0}
+        self.commands: list[NDArray[np.float32]] = []
+        self.resets: list[tuple[int | None, int]] = []
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Any, Any]:
+        self.resets.append((seed, len(self.commands)))
+        return None, {}
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, Any]:
+        self.commands.append(action)
+        speed, age = len(self.commands) % 7 / 4.0, (len(self.commands) - 1 - self.resets[-1][1]) % 6
+        turn = float(action[0]) * (_TRACKS.per_metre * speed + _TRACKS.per_second)
+        numbers = np.array([9.0, speed, 9.0, -turn if age >= 3 else 9.0])
+        seen = numbers if len(self.commands) % 2 else {"state": numbers}
+        return seen, 0.0, len(self.commands) == 14, len(self.commands) == 31, {}
+
+
+def test_the_response_is_measured_in_the_second_half_of_each_command() -> None:
+    env = _Turning()
+    assert dataclasses.astuple(measure_response(env, 1, 3)) == pytest.approx((0.1, 0.6))
+    assert env.resets == [(0, 0), (None, 14), (None, 31)]
+    starts = [0, 6, 12, 14, 20, 26, *range(31, 100, 6)]
+    assert [
+        i for i, now in enumerate(env.commands) if i == 0 or (now != env.commands[i - 1]).any()
+    ] == starts
+    steering, throttle = np.array([env.commands[i] for i in starts]).T
+    assert (len(env.commands), env.commands[0].dtype) == (100, np.float32)
+    assert -0.5 <= steering.min() < -0.3 < 0.3 < steering.max() <= 0.5
+    assert 0.4 <= throttle.min() < 0.5 < 0.7 < throttle.max() <= 0.8
 
 
 def test_the_measured_response_matches_the_geometry() -> None:

@@ -43,7 +43,7 @@ def test_policies_that_fit_are_accepted() -> None:
     require_fit(_WAYPOINTS, replace(_CAR, turning=None), measures=True)
     within = clone_card(data={"rate_jitter": 0.03}, control_hz=19.61)
     require_fit(within, _CAR, measures=False)
-    with pytest.raises(PolicyError, match="learned at 19.61 actions a second, but"):
+    with pytest.raises(PolicyError, match=r"learned at 19\.61 actions a second, but"):
         require_fit(clone_card(control_hz=19.61), _CAR, measures=False)
 
 
