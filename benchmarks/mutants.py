@@ -57,9 +57,9 @@ and a study's numbers depend on: `make mutants` changes one place of a function 
 mutant is killed if a test fails. Changes of only the text of an error, of types for checkers and of
 `strict` of `zip` are not counted, and
 [equivalent mutants](../benchmarks/equivalent_mutants.toml), which no test could notice, are listed
-with their reasons. `waypoints` is without `WaypointView`, whose tests need a renderer, and `process`
-is only the link to the guard. The survivors follow the table, each with the line that it changed. Each row is
-from the last complete run of its module.
+with their reasons. `waypoints` is without `WaypointView`, whose tests need a renderer, and
+`process` is only the link to the guard. The survivors follow the table, each with the line that it
+changed. Each row is from the last complete run of its module.
 """
 
 
