@@ -19,7 +19,6 @@ from shapechanger.robot.profile.load import find_profile
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv
 from shapechanger.vehicles.waypoints import (
     AHEAD_M,
-    WIDEST_RAD,
     SteeringResponse,
     command,
     fit_response,
@@ -27,37 +26,25 @@ from shapechanger.vehicles.waypoints import (
     waypoints_of,
 )
 
+_BODIES = {"wheels": SteeringResponse(2.0, 0.0), "tracks": SteeringResponse(0.8, 3.1)}
 _TRACKS = SteeringResponse(0.1, 0.6)
 _COURSE = {"course": 2, "start": 2}
 _BLIND: dict[str, Any] = {"image": False, "put_back": True}
 
 
-def _steering(response: SteeringResponse, bearing: float, speed: float) -> float:
-    action = np.array((bearing / WIDEST_RAD, 0.0))
-    return float(command(action, response, speed, on_the_spot=False)[0])
-
-
-def test_steering_follows_from_the_bearing() -> None:
-    """Steering has the bearing's sign and saturates."""
-    car, tank = SteeringResponse(2.0, 0.0), SteeringResponse(0.0, 4.0)
-    assert _steering(car, 0.0, 1.0) == 0.0
-    assert _steering(car, 0.1, 1.0) == -_steering(car, -0.1, 1.0) > 0.0
-    assert _steering(car, 1.0, 1.0) == 1.0
-    # For a car the steering does not depend on the speed, for tracks it grows with it.
-    assert _steering(car, 0.2, 2.0) == pytest.approx(_steering(car, 0.2, 1.0))
-    assert _steering(tank, 0.2, 1.0) == pytest.approx(2.0 * _steering(tank, 0.2, 0.5))
-    assert _steering(tank, 0.2, 1.0) == pytest.approx(2.0 * math.sin(0.2) / AHEAD_M / 4.0)
-
-
+@pytest.mark.parametrize("response", [*_BODIES.values(), _TRACKS])
 @pytest.mark.parametrize("on_the_spot", [True, False])
-def test_the_throttle_leaves_room_for_the_tracks_to_turn(on_the_spot: bool) -> None:
-    """Each track has the sum or difference of throttle and steering, which must not saturate."""
-    for bearing, share in itertools.product((-4.0, -1.0, -0.3, 0.2, 3.0), (-3.0, -0.6, 0.9, 2.0)):
+def test_steering_follows_from_the_bearing(response: SteeringResponse, on_the_spot: bool) -> None:
+    """Tracks have the sum and difference of throttle and steering, which must not saturate."""
+    for bearing, share, speed in itertools.product(
+        (-4.0, -0.3, 0.0, 0.2, 3.0), (-3.0, -0.6, 0.9, 2.0), (0.1, 1.2)
+    ):
         action = np.array((bearing, share))
-        steering, throttle = command(action, _TRACKS, 0.1, on_the_spot=on_the_spot)
-        turn = 2.0 * math.sin(np.clip(bearing, -1.0, 1.0)) / AHEAD_M
-        # A measured speed below 0.3 m/s counts as 0.3 m/s.
-        assert steering == pytest.approx(np.clip(turn * 0.3 / (0.3 * 0.1 + 0.6), -1.0, 1.0))
+        steering, throttle = command(action, response, speed, on_the_spot=on_the_spot)
+        turn = 2.0 * math.sin(np.clip(bearing, -1.0, 1.0)) / AHEAD_M  # rad/m.
+        fast = max(speed, 0.3)
+        full = response.per_metre * fast + response.per_second
+        assert steering == pytest.approx(np.clip(turn * fast / full, -1.0, 1.0))
         asked = np.clip(0.5 * (share + 1.0), 0.25, 1.0)
         room = max(1.0 - abs(steering), 0.25) if on_the_spot else 1.0
         assert throttle == pytest.approx(min(asked, room))
@@ -67,9 +54,6 @@ def test_the_throttle_leaves_room_for_the_tracks_to_turn(on_the_spot: bool) -> N
 def test_a_waypoint_is_two_finite_numbers(action: tuple[float, ...]) -> None:
     with pytest.raises(SpaceMismatch, match="must be two finite numbers, bearing and speed, got"):
         command(np.array(action), _TRACKS, 1.0, on_the_spot=False)
-
-
-_BODIES = {"wheels": SteeringResponse(2.0, 0.0), "tracks": SteeringResponse(0.8, 3.1)}
 
 
 @pytest.mark.parametrize("body", _BODIES)
