@@ -152,7 +152,7 @@ class Stall:
 
 
 class Propulsion:
-    """Forward component of the actions; positive is forward.
+    """Forward component of the actions; positive is forward. Actions that propel rest at 0.
 
     Attributes:
         forward: Indices of the actions that push the robot forward or backward.
@@ -162,23 +162,21 @@ class Propulsion:
         self._actions = actions
         # The steering of a tank propels too, but never forward.
         self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != "steering")
-        self._rests = [(i, actions[i].rest) for i in self.forward]
         # Indices of the actions for which the profile states a speed.
         self._known = tuple(i for i in self.forward if actions[i].unit == "m/s")
 
     def push(self, values: Sequence[float]) -> float:
         """Return the forward push, -1 to 1; negative is backward."""
         push = 0.0
-        for i, rest in self._rests:
-            push += values[i] - rest
-        return push / len(self._rests) if self._rests else 0.0
+        for i in self.forward:
+            push += values[i]
+        return push / len(self.forward) if self.forward else 0.0
 
     def speed(self, values: Sequence[float]) -> float | None:
         """Return the speed that the profile states for this push, m/s; None if unknown."""
         if not self._known:
             return None
-        known = [(self._actions[i], values[i]) for i in self._known]
-        return sum([a.gain * (value - a.rest) for a, value in known]) / len(known)
+        return sum([self._actions[i].gain * values[i] for i in self._known]) / len(self._known)
 
 
 class MotionReflexes:
@@ -191,7 +189,6 @@ class MotionReflexes:
     """
 
     def __init__(self, plan: GuardPlan) -> None:
-        self._actions = plan.actions
         self._limit_m = plan.limits.stop_distance_m
         self._measures_distance = any(s.measures == "distance" for s in plan.sensors)
         self.bump = Bump(plan.limits.bump_hold_ms)
@@ -231,9 +228,8 @@ class MotionReflexes:
         forbidden = [(way, reason) for way, holds, reason in reasons if holds]
         kept, given = list(aims), dict[str, None]()
         for i in self.propulsion.forward:
-            rest = self._actions[i].rest
-            asked = [reason for way, reason in forbidden if way * (aims[i] - rest) > 0.0]
+            asked = [reason for way, reason in forbidden if way * aims[i] > 0.0]
             if asked:
-                kept[i] = rest
+                kept[i] = 0.0
                 given |= dict.fromkeys(asked)
         return tuple(kept), " ".join(given)
