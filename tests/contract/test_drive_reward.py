@@ -1,4 +1,4 @@
-"""Properties of the driving reward, and of duty cycles."""
+"""Properties of the driving reward."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.contract.drive_reward import DriveReward
-from shapechanger.contract.limits import Duty
 from shapechanger.errors import UnknownName
 
 speeds = st.floats(-10.0, 10.0)
@@ -73,12 +72,3 @@ def test_weights_are_set_by_name() -> None:
     assert DriveReward.from_weights({}) == DriveReward()
     with pytest.raises(UnknownName, match="Did you mean 'velocity'"):
         DriveReward.from_weights({"velocty": 1.0})
-
-
-@given(st.floats(0.0, 0.5), st.floats(0.6, 1.0), st.floats(0.0, 1.0))
-def test_a_duty_has_the_size_of_its_value(start: float, full: float, value: float) -> None:
-    """A duty's size is its value, up to the steps of 1 %; only a duty of 0 stops the motor."""
-    duty = Duty(start, full)
-    size = duty.size_at(duty.of(value))
-    assert size == pytest.approx(value, abs=0.5 / 100 / (full - start) + 1e-9) or size == 0.005
-    assert (size == 0.0) == (duty.of(value) == 0.0)

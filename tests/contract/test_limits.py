@@ -1,8 +1,8 @@
-"""Propulsion, duties and motion reflexes, at the edges of their ranges."""
+"""Propulsion and motion reflexes, at the edges of their ranges."""
 
 import pytest
 
-from shapechanger.contract.limits import Duty, MotionReflexes, Propulsion, Stall
+from shapechanger.contract.limits import MotionReflexes, Propulsion, Stall
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, SensorPlan
 
 _ACTIONS = (
@@ -23,32 +23,19 @@ def test_push_and_speed_are_means() -> None:
     assert (turning.push((1.0,)), turning.speed((1.0,))) == (0.0, None)
 
 
-def test_a_duty_is_full_beyond_the_range() -> None:
-    duty = Duty(0.2, 0.8)
-    assert (duty.of(1.7), duty.of(-1.7), duty.size_at(1.0)) == (0.8, 0.8, 1.0)
-
-
 @pytest.mark.parametrize(
     ("after_s", "push", "speed", "way"),
-    [
-        (1.0, 0.31, 0.009, 1),
-        (1.0, -0.31, -0.009, -1),
-        (1.0, 0.3, 0.0, 0),  # At the threshold, no motion is expected.
-        (1.0, -0.3, 0.0, 0),
-        (1.0, -0.31, 0.01, 0),  # It moves.
-        (1.001, 0.31, 0.0, 0),  # Not yet.
-        (1e-9, 0.31, 0.0, 1),
-        (0.0, 0.31, 0.0, 0),  # Disabled.
-    ],
+    [(1.0, -0.31, -0.009, -1), (1.0, -0.3, 0.0, 0), (1.0, 0.31, 0.01, 0), (1e-9, 0.31, 0.0, 1)],
 )
-def test_a_stall_is_a_push_without_motion(
+def test_a_stall_needs_a_push_without_motion(
     after_s: float, push: float, speed: float, way: int
 ) -> None:
-    stall = Stall(after_s, 0.3)
+    stall, disabled = Stall(after_s, 0.3), Stall(0.0, 0.3)
     assert stall.watches is False
     for now_ns in (5, 1_000_000_005):
         stall.sense({"speed": speed}, push, now_ns)
-    assert (stall.way, stall.watches) == (way, after_s > 0.0)
+        disabled.sense({"speed": speed}, push, now_ns)
+    assert (stall.way, stall.watches, disabled.way, disabled.watches) == (way, True, 0, False)
 
 
 def test_each_action_is_held_back_separately() -> None:

@@ -15,12 +15,15 @@ _values = st.floats(-1.0, 1.0)
 
 @given(value=_values, start=st.floats(0.0, 0.5), full=st.floats(0.6, 1.0))
 def test_duty_round_trips_within_a_step(value: float, start: float, full: float) -> None:
-    """Every value but 0 starts the motor; duties are whole percents, as gpiozero truncates."""
+    """Only 0 and values below half a step stop the motor; gpiozero truncates to whole percents."""
     duty = Duty(start, full)
-    size = duty.of(value)
-    assert duty.size_at(size) == pytest.approx(abs(value), abs=0.011 / (full - start))
-    assert size >= start - 0.005 if value else size == 0.0
-    assert int(size * 100) == round(size * 100)
+    done, error = duty.of(value), 0.5 / 100 / (full - start) + 1e-9
+    assert duty.size_at(done) == pytest.approx(abs(value), abs=error) or duty.size_at(done) == 0.005
+    assert (duty.size_at(done) == 0.0) == (done == 0.0)
+    assert done >= start - 0.005 if value else done == 0.0
+    assert int(done * 100) == round(done * 100)
+    beyond = duty.of(-1.7)
+    assert (beyond, duty.size_at(1.0)) == (pytest.approx(full, abs=0.005), 1.0)
 
 
 @given(values=st.lists(_values, min_size=1, max_size=8))
