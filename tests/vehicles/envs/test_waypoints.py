@@ -40,7 +40,8 @@ def test_steering_follows_from_the_bearing(response: SteeringResponse, on_the_sp
         (-4.0, -0.3, 0.0, 0.2, 3.0), (-3.0, -0.6, 0.9, 2.0), (0.1, 1.2)
     ):
         action = np.array((bearing, share))
-        steering, throttle = command(action, response, speed, on_the_spot=on_the_spot)
+        steering, throttle = made = command(action, response, speed, on_the_spot=on_the_spot)
+        assert made.dtype == np.float32
         turn = 2.0 * math.sin(np.clip(bearing, -1.0, 1.0)) / AHEAD_M  # rad/m.
         fast = max(speed, 0.3)
         full = response.per_metre * fast + response.per_second
