@@ -20,6 +20,7 @@ from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv
 from shapechanger.vehicles.waypoints import (
     AHEAD_M,
     SteeringResponse,
+    _is_steady,
     command,
     fit_response,
     measure_response,
@@ -126,6 +127,30 @@ def test_a_drive_without_a_clear_response_is_refused() -> None:
         fit_response(np.zeros(200), speed, rng.normal(0.0, 0.3, 200), times_s)
 
 
+def test_the_share_of_the_turning_that_steering_explains() -> None:
+    """The deviation from the turn is orthogonal to it: 1.5 parts of squares, of 2.5 in all."""
+    steering = np.repeat(np.tile((0.5, -0.5), 20), 6)
+    deviation = math.sqrt(1.5) * np.tile((1.0, -1.0), 120)
+    with pytest.raises(StudyError, match="steering explains 40% of how the vehicle turns"):
+        fit_response(steering, np.ones(240), deviation - 2.0 * steering, np.arange(240) / 20.0)
+
+
+@pytest.mark.parametrize(
+    ("times_s", "steady"),
+    [
+        ([0.0], [0]),
+        ([0.0, 0.05, 0.1, 0.15, 0.35, 0.4, 0.45], [0, 0, 1, 1, 0, 0, 1]),  # A gap.
+        ([0.0, 0.05, 0.1, 0.21, 0.26], [0, 0, 1, 1, 1]),  # One frame was lost.
+        ([0.0, 0.05, 0.1, 0.1, 0.15, 0.2], [0, 0, 1, 0, 0, 1]),  # Another episode.
+        ([0.0, 0.25, 0.5, 0.75, 1.125, 1.625], [0, 1, 1, 1, 1, 0]),
+        (np.arange(12) / 100.0, [0] * 10 + [1, 1]),
+    ],
+)
+def test_steps_are_steady_from_the_lag_on(times_s: list[float], steady: list[int]) -> None:
+    found = _is_steady(np.zeros(len(times_s)), np.asarray(times_s))
+    assert found.tolist() == list(map(bool, steady))
+
+
 _TABLE = r"^\[sensor\.{}\]\n(?:[^\[\n].*\n|\n)*"
 
 
@@ -170,8 +195,10 @@ class _Turning(gym.Env[Any, Any]):
 
 
 def test_the_response_is_measured_in_the_second_half_of_each_command() -> None:
-    env = _Turning()
+    env, again = _Turning(), _Turning()
     assert dataclasses.astuple(measure_response(env, 1, 3)) == pytest.approx((0.1, 0.6))
+    measure_response(again, 1, 3)
+    np.testing.assert_array_equal(again.commands, env.commands)
     assert env.resets == [(0, 0), (None, 14), (None, 31)]
     starts = [0, 6, 12, 14, 20, 26, *range(31, 100, 6)]
     assert [
