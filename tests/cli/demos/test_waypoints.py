@@ -94,19 +94,19 @@ def test_a_drive_becomes_a_policy_of_waypoints(
     printed = " ".join(capsys.readouterr().out.split())
     assert "looks 0 degrees down with a vertical field of view of 48.8" in printed
     assert "turns 1.90 rad for each metre and 0.00 for each second" in printed
-    assert "fitted to the recorded motion" in printed
+    assert ", fitted to the recorded motion." in printed
     assert "16.7% of the steps are left out: the vehicle stands still" in printed
     assert "outside the image, which ends 31 degrees to each side" in printed
     DemosEvaluate(out, data).run()
     printed = " ".join(capsys.readouterr().out.split())
-    assert "fitted to the recorded motion" in printed
+    assert ", fitted to the recorded motion." in printed
     assert "learned from the first 40 of these 50 steps" in printed
     assert "waypoint/bearing: mean absolute error" in printed
     other = _record(tmp_path / "other", state=None)
     with pytest.raises(DemosError, match="give --response"):
         DemosEvaluate(out, other).run()
     DemosEvaluate(out, other, response=(1.9, 0.0)).run()
-    assert "as given" in " ".join(capsys.readouterr().out.split())
+    assert ", as given." in " ".join(capsys.readouterr().out.split())
 
 
 def test_waypoints_are_on_the_circle_that_was_driven(tmp_path: Path) -> None:
@@ -143,7 +143,9 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
         as_waypoints(data)
     assert as_waypoints(data, SteeringResponse(1.9, 0.0)).kept.sum() == 50
     with pytest.raises(DemosError, match="but the recording has no speed"):
-        as_waypoints(data, SteeringResponse(0.8, 3.1))
+        as_waypoints(data, SteeringResponse(0.8, 0.9))
+    data = _loaded(_record(tmp_path / "moves"))
+    assert as_waypoints(data, SteeringResponse(0.8, 3.1)).kept.sum() == 60
     data = _loaded(_record(tmp_path / "stands", 10))
     with pytest.raises(DemosError, match=r"drive curves to both sides: give --response RAD_PER_M"):
         as_waypoints(data)

@@ -61,6 +61,8 @@ def test_the_pieces_reassemble_the_episode(ask: Ask, tmp_path: Path, count: int)
         piece = ask(link.Fetch(episode=path.name, first=at, count=count))
         assert isinstance(piece, link.Piece)
         assert 1 <= len(piece.lines) <= count
+        assert (piece.episode, piece.first) == (path.name, at)
+        assert all(frame is None or frame for frame in piece.frames)
         assert piece.header.encode() == (path / "episode.json").read_bytes()
         lines += "".join(f"{line}\n" for line in piece.lines).encode()
         pictures += piece.frames
@@ -77,7 +79,19 @@ def test_pieces_are_limited_in_size(ask: Ask, tmp_path: Path) -> None:
     name = writer.path.name
     pieces = [ask(link.Fetch(episode=name, first=first)) for first in range(4)]
     assert [len(p.lines) for p in pieces if isinstance(p, link.Piece)] == [1, 1, 1]
-    assert "too large" in refusal(pieces[3])
+    assert f"Line 4 of {writer.path / 'steps.jsonl'} is too large" in refusal(pieces[3])
+
+
+@pytest.mark.parametrize(("keep", "kept"), [(False, 4), (True, 6)])
+def test_a_judgement_is_written_and_the_episode_summarised(
+    ask: Ask, tmp_path: Path, keep: bool, kept: int
+) -> None:
+    path = record(tmp_path, 6)
+    answer = ask(link.Judge(episode=path.name, first=1, last=2, keep=keep))
+    assert isinstance(answer, link.Recordings)
+    assert [(one.id, one.kept) for one in answer.episodes] == [(path.name, kept)]
+    line = (path / "steps.jsonl").read_text().splitlines()[-1]
+    assert ('"bad"' in line) == (not keep)
 
 
 @given(
@@ -144,7 +158,9 @@ def test_damage_is_reported_and_the_rest_is_readable(ask: Ask, tmp_path: Path) -
     (tmp_path / "secret.jpg").write_bytes(b"secret")
     secret = '{"kind":"step","step":0,"frame":["../../secret.jpg",6,""]}\n'
     (path / "steps.jsonl").write_text(secret)
-    assert "damaged" in refusal(ask(link.Fetch(episode=path.name)))
+    assert f"Line 1 of {path / 'steps.jsonl'} is damaged" in refusal(
+        ask(link.Fetch(episode=path.name))
+    )
     (path / "episode.json").write_text("{")
     found = ask(link.Browse())
     assert isinstance(found, link.Recordings)

@@ -13,12 +13,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from shapechanger.contract.world import STANDING_MPS
 from shapechanger.envs.catalogue import WAYPOINT_ENVS
 from shapechanger.errors import EmptyShift, MorphologyError, ProfileError, SpaceMismatch, StudyError
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv
 from shapechanger.vehicles.waypoints import (
     AHEAD_M,
+    LEAST_THROTTLE,
     SteeringResponse,
     _is_steady,
     command,
@@ -95,6 +97,17 @@ def test_commands_that_do_not_point_ahead_are_not_usable() -> None:
     found = waypoints_of(commands, _BODIES["wheels"], speed)
     assert found.usable.tolist() == [False] * 6 + [True, True]
     np.testing.assert_allclose(found.actions[6:, 1], [0.0, -1.0])
+    assert found.actions.dtype == np.float32
+    # Commands are clipped, and the bearing ends at the widest, where the circle is narrower.
+    sharp = waypoints_of(
+        np.array([(9.0, 9.0), (-9.0, -9.0)]), SteeringResponse(3.0, 0.0), np.ones(2)
+    )
+    np.testing.assert_allclose(sharp.actions, [(1.0, 1.0), (-1.0, -1.0)])
+    weak = waypoints_of(np.array([(9.0, 0.5)]), _BODIES["wheels"], np.array([1.0]))
+    assert weak.actions[0, 0] == pytest.approx(math.asin(0.8))
+    edges = np.array([(0.0, 0.0), (0.0, LEAST_THROTTLE), (0.5, 0.0)])
+    still = waypoints_of(edges, _BODIES["tracks"], np.array([STANDING_MPS, 0.0, 0.0]))
+    assert still.usable.all()
     braked = command(found.actions[7], _BODIES["wheels"], 1.5, on_the_spot=False)
     assert braked[1] == pytest.approx(0.25)  # A waypoint cannot brake harder.
 
