@@ -61,7 +61,7 @@ def spans(page: Path) -> list[str]:
 
 @cache
 def leaves() -> dict[tuple[str, ...], type]:
-    """Return the class of every command by its words."""
+    """Return the class of every command, keyed by its names."""
     found: dict[tuple[str, ...], type] = {}
 
     def walk(words: tuple[str, ...]) -> None:

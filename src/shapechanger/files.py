@@ -157,14 +157,14 @@ def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
 
 
 def from_builtins(kind: Any, value: Any) -> Any:
-    """Convert a value by its class's method `from_builtins`; a `dec_hook` of msgspec."""
+    """Convert a value with its class's method `from_builtins`; a `dec_hook` of msgspec."""
     return kind.from_builtins(value)
 
 
 def converted(
     value: Any, kind: Any, error: type[ShapechangerError], failure: str, *, strict: bool = True
 ) -> Any:
-    """Convert builtin values to a type that msgspec knows; `failure` begins the error's message."""
+    """Convert builtins to a type that msgspec supports; `failure` begins the error's message."""
     try:
         return msgspec.convert(value, kind, strict=strict)
     except msgspec.ValidationError as cause:
@@ -172,7 +172,7 @@ def converted(
 
 
 def decoded(text: str | bytes, kind: type[_T], error: type[ShapechangerError], failure: str) -> _T:
-    """Decode JSON to a type that msgspec knows; `failure` begins the error's message."""
+    """Decode JSON to a type that msgspec supports; `failure` begins the error's message."""
     try:
         return msgspec.json.decode(text, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError) as cause:

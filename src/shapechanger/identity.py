@@ -99,7 +99,7 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> Identity:
 def identify_code(names: Iterable[str], *objects: Any) -> Identity:
     """Return the identity of a part without a model: the hashes of its custom modules.
 
-    The modules define `objects`, or are named in `names`, as in `my_methods:warm-start`.
+    The modules define `objects`, or are named in `names`, such as `my_methods:warm-start`.
     """
     return Identity(files=own_modules({*named_modules(names), *modules_of(*objects)}))
 

@@ -87,7 +87,7 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
             msgspec.structs.force_setattr(self, "high", _HIGHEST)
 
     def __str__(self) -> str:
-        """Return the name with its unit, as in `torso/z [m]`."""
+        """Return the name with its unit, such as `torso/z [m]`."""
         return f"{self.name} [{self.unit}]"
 
     @property
@@ -206,7 +206,7 @@ class Layout(msgspec.Struct, frozen=True):
 
 
 def value_names(layout: Iterable[Feature]) -> list[str]:
-    """Return a name for each value of a layout; values of a block are numbered, as in `map[3]`."""
+    """Return a name for each value of a layout; values of a block are numbered, like `map[3]`."""
     return [
         f"{feature.name}[{place}]" if feature.shape else feature.name
         for feature in layout

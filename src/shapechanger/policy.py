@@ -386,7 +386,7 @@ def read_network(path: Path) -> tuple[PolicyCard, Network]:
     card = msgspec.json.decode(facts[ONNX_CARD], type=PolicyCard)
     sides = (*session.get_inputs(), *session.get_outputs())
     if (found := {side.name: list(side.shape[1:]) for side in sides}) != card.shapes:
-        raise ValueError(f"its network takes and gives {found}, and its card says {card.shapes}")
+        raise ValueError(f"its network takes and gives {found}, and its card states {card.shapes}")
     return card, lambda inputs: session.run(None, dict(inputs))[0]
 
 

@@ -184,9 +184,9 @@ def test_an_ant_without_torque_stays_healthy(env_id: str, arguments: dict[str, A
     with gym.make(env_id, **arguments) as made:
         env: Any = made.unwrapped
         made.reset(seed=11)
-        nothing = np.zeros(env.model.nu, np.float32)
+        zeros = np.zeros(env.model.nu, np.float32)
         for step in range(_ZERO_TORQUE_STEPS):
-            _, _, terminated, truncated, info = made.step(nothing)
+            _, _, terminated, truncated, info = made.step(zeros)
             assert not terminated
             assert truncated == (step == _ZERO_TORQUE_STEPS - 1)
             assert info["reward_survive"] == 1.0

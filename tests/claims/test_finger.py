@@ -58,8 +58,8 @@ def test_the_shipped_policy_follows() -> None:
     policy = load_policy(POLICIES["track"])
     assert policy.card.env.id == TRACK
     infos = _ends(_alone(policy), TRACK, 1, path=_CIRCLE)
-    knows = _ends(_controller(TRACK, "impedance"), TRACK, 1, path=_CIRCLE)
-    errors = [np.mean([info["rms"] for info in some]) for some in (infos, knows)]
+    oracle = _ends(_controller(TRACK, "impedance"), TRACK, 1, path=_CIRCLE)
+    errors = [np.mean([info["rms"] for info in some]) for some in (infos, oracle)]
     assert errors[0] <= 2.0 * errors[1]
 
 

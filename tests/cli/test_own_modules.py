@@ -134,7 +134,7 @@ def test_a_policy_is_evaluated_in_its_robot_until_the_robot_changes(
 def test_a_suite_is_watched_with_own_methods(
     project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
-    """From another folder, the error asks to change the folder, and not to delete the suite."""
+    """From another folder, the error suggests changing the folder, not deleting the suite."""
     assert "a-to-b" in cli.output("suite", "watch", "suite")
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(project)])
     monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})

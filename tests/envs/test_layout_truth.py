@@ -90,7 +90,7 @@ def _state(env: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lifted(env: Any, pose: np.ndarray) -> np.ndarray:
-    """Return the pose raised until nothing touches the body."""
+    """Return the pose raised until the body has no contacts."""
     result = pose.copy()
     lift = trunk_lift(env.model)
     if lift is not None:

@@ -62,7 +62,7 @@ _MAKE = """
 import gymnasium as gym
 import shapechanger
 
-{asks}
+{statement}
 """
 _REFUSED = """
 from shapechanger.errors import RenderError
@@ -77,7 +77,7 @@ def test_an_env_that_cannot_draw_is_refused_when_it_is_made() -> None:
     """`gym.make` with a render mode raises at once; without rendering it works."""
     script = (
         _installed()
-        + _MAKE.format(asks="gym.make('shapechanger/Ant-v1').reset(seed=0)")
+        + _MAKE.format(statement="gym.make('shapechanger/Ant-v1').reset(seed=0)")
         + _REFUSED.format(statement="gym.make('shapechanger/Ant-v1', render_mode='rgb_array')")
         + _REFUSED.format(statement="gym.make('shapechanger/Ant-v1').unwrapped.picture()")
     )
@@ -88,7 +88,7 @@ def test_an_env_that_cannot_draw_is_refused_when_it_is_made() -> None:
 
 def test_a_window_without_a_display_is_refused() -> None:
     """`render_mode="human"` without a display raises; GLFW would abort the process."""
-    script = _MAKE.format(asks="") + _REFUSED.format(
+    script = _MAKE.format(statement="") + _REFUSED.format(
         statement="gym.make('shapechanger/Ant-v1', render_mode='human')"
     )
     for variables in ({}, {"MUJOCO_GL": "egl"}):
@@ -98,7 +98,7 @@ def test_a_window_without_a_display_is_refused() -> None:
 def test_a_display_that_does_not_open_is_refused() -> None:
     """A broken `DISPLAY` raises; GLFW would abort the process."""
     window, picture = (
-        _output(_MAKE.format(asks="") + _REFUSED.format(statement=statement), DISPLAY=":77")
+        _output(_MAKE.format(statement="") + _REFUSED.format(statement=statement), DISPLAY=":77")
         for statement in (
             "gym.make('shapechanger/Ant-v1', render_mode='human')",
             "gym.make('shapechanger/Ant-v1').unwrapped.picture()",

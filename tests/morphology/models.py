@@ -231,7 +231,7 @@ def capsule_inertia(radius: float, length: float, density: float) -> tuple[float
 
 
 def physics(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> dict[str, Array]:
-    """Return the physical properties of a model by name, with joints at given positions.
+    """Return the physical properties of a model, keyed by name, with joints at given positions.
 
     Mass, centre of mass and inertia add up all bodies, so that models with
     different bodies can be compared.

@@ -181,7 +181,7 @@ def test_a_standing_pose_touches_the_floor() -> None:
         assert pose[2] == height
 
 
-# A leg whose foot is driven by a rod, on a free trunk, as in Cassie.
+# A leg whose foot is driven by a rod, on a free trunk, like Cassie's.
 _FOUR_BAR = """
 <mujoco>
   <compiler angle="radian"/>

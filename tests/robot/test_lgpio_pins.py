@@ -13,7 +13,7 @@ _OURS = "shapechanger.robot.lgpio_pins"
 
 
 class _Lgpio(types.ModuleType):
-    """Levels and PWM of a chip; a new duty waits for the end of the cycle, as in `lgPthTx.c`."""
+    """Levels and PWM of a chip; a new duty waits for the end of the cycle, like `lgPthTx.c`'s."""
 
     SET_PULL_NONE, SET_PULL_UP, SET_PULL_DOWN = 0, 1, 2
     BOTH_EDGES, RISING_EDGE, FALLING_EDGE = 3, 1, 2

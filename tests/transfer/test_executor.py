@@ -212,8 +212,8 @@ def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path)
 @pytest.mark.parametrize(
     ("address", "text"),
     [
-        ("127.0.0.1:9", "does not answer (nothing listens there)"),
-        ("127.0.0.1:99999", "does not answer (nothing listens there)"),
+        ("127.0.0.1:9", "does not answer (no program listens there)"),
+        ("127.0.0.1:99999", "does not answer (no program listens there)"),
         ("nowhere", "HOST:PORT"),
         ("ray://127.0.0.1:9", "HOST:PORT"),
     ],

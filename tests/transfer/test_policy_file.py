@@ -201,7 +201,7 @@ def test_a_card_of_another_size_is_refused(files: tuple[Path, Path], tmp_path: P
             card["action"] = card["observation"]
             entry.value = json.dumps(card)
     (tmp_path / "mine.onnx").write_bytes(model.SerializeToString())
-    for name, text in (("mine.onnx", "its card says"), ("none.onnx", "There is no policy file")):
+    for name, text in (("mine.onnx", "its card states"), ("none.onnx", "There is no policy file")):
         with pytest.raises(PolicyError, match=text):
             load_policy(tmp_path / name)
 

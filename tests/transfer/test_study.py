@@ -154,7 +154,7 @@ def test_wrong_arguments_are_refused_before_anything_is_trained(
 def test_a_folder_of_another_study_is_refused(
     finished: tuple[Study, Path], out: Path, differs: str
 ) -> None:
-    """The message names the differences; nothing is overwritten."""
+    """The message names the differences; no file is overwritten."""
     changed: Any = {"seed": 1, "versions": {"mujoco": "0.1"}}[differs]
     other = msgspec.structs.replace(tiny_plan(), **{differs: changed})
     with pytest.raises(ForeignStudy, match=f"differs in {differs}"):

@@ -149,7 +149,7 @@ def test_plan_run_and_card_contain_identities(copied: Path) -> None:
 
 
 def test_a_run_whose_env_differs_from_the_plan_is_refused(copied: Path) -> None:
-    """Nothing is written; runs that do not use the changed env are not refused."""
+    """No file is written; runs that do not use the changed env are not refused."""
     plan = plan_of("shared")
     (copied / "b.xml").write_text(XML.format(0.5))
     run = Run("scratch", 0)

@@ -64,7 +64,7 @@ class HubPush:
 
 @dataclass(frozen=True)
 class HubPull:
-    """Download a policy or a recording from the Hugging Face Hub, and nothing else of it."""
+    """Download a policy or a recording, and no other files, from the Hugging Face Hub."""
 
     repo: _Repo
     """Name of a repository that `hub push` has filled, such as ada/ant."""
@@ -136,7 +136,7 @@ def _refuse_onnx(path: Path) -> None:
 
 
 def _linked(episodes: list[Episode], folder: Path) -> dict[str, str]:
-    """Link the files of episodes into a folder; return the SHA-256 of their steps, by name."""
+    """Link the files of episodes into a folder; return their steps' SHA-256, keyed by name."""
     hashes: dict[str, str] = {}
     for episode in episodes:
         name = f"{hub.EPISODES}/{episode.path.resolve().name}"

@@ -149,8 +149,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def parse(arguments: Sequence[str]) -> Any:
     """Parse a command line into a command, which `run` executes."""
-    words, command = find_command(arguments)
-    rest, prog = arguments[len(words) :], " ".join(("shapechanger", *words))
+    names, command = find_command(arguments)
+    rest, prog = arguments[len(names) :], " ".join(("shapechanger", *names))
     kind: Any = Union
     if isinstance(command, Group):
         described = [
@@ -173,21 +173,21 @@ class _NotLoaded:
 
 def find_command(arguments: Sequence[str]) -> tuple[list[str], type | Group]:
     """Return the first words of a command line, which name a command, and its class or group."""
-    words: list[str] = []
+    names: list[str] = []
     found: str | Group = COMMANDS
     for word in arguments:
         if isinstance(found, str) or word.startswith("-"):
             break
         name = word.replace("_", "-")  # tyro converts names in the same way.
         if name not in found.commands:
-            group = " ".join(("shapechanger", *words))
+            group = " ".join(("shapechanger", *names))
             raise UnknownName(f"command of `{group}`", word, found.commands)
-        words.append(name)
+        names.append(name)
         found = found.commands[name]
     if isinstance(found, Group):
-        return words, found
+        return names, found
     module, _, kind = found.partition(":")
-    return words, getattr(import_module(f"shapechanger.cli.{module}"), kind)
+    return names, getattr(import_module(f"shapechanger.cli.{module}"), kind)
 
 
 def _summary(command: str | Group) -> str:

@@ -1,6 +1,6 @@
 """The driving task: go forward fast without collisions and without getting stuck.
 
-The paper of the original release (2017) asks a car to "avoid collisions while maximizing velocity";
+The paper of the original release (2017) sets the task "avoid collisions while maximizing velocity";
 the program of that release returned a reward of 0.0 at every step. Here a term is omitted if its
 quantity is not measured.
 """

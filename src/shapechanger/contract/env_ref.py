@@ -268,7 +268,7 @@ def certify_shift(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> str:
     """Return the certificate of the change between two envs; empty if the source issues none.
 
     Raises:
-        EmptyShift: If nothing changes.
+        EmptyShift: If the envs behave the same.
         StudyError: If an env fails in the rollout that the certificate compares.
     """
     certify = getattr(source.unwrapped, "certify_shift", None)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from shapechanger.contract.plan import ActionPlan, GuardPlan
 
 _SAME = 1e-6  # Tolerance for values that were rounded to 32-bit floats.
-# Duty cycles have steps of 1 %, as in gpiozero with lgpio, whose `LGPIOPin._set_state` computes
+# Duty cycles have the steps of 1 % of gpiozero with lgpio, whose `LGPIOPin._set_state` computes
 # `int(value * 100)`. So all pin factories act equally, and `Duty.of` returns the applied duty.
 _STEPS = 100
 # Speed below which a robot counts as standing, m/s: one count per second of a coarse encoder.

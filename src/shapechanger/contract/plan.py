@@ -23,7 +23,7 @@ Part = Literal["", DrivingPart, "steering", "rudder", "gear", "bed", "joint", "t
 
 Mix = Annotated[
     dict[str, Annotated[float, Meta(ge=-10, le=10)]],
-    Meta(description="a table of numbers from -10 to 10 by name of action"),
+    Meta(description="a table of numbers from -10 to 10, keyed by action"),
 ]
 
 

@@ -106,7 +106,7 @@ def pickles(make: MakeEnv) -> None:
 def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
     """The reward is the sum of the terms in `info`.
 
-    Their names are `reward_...`, or `..._penalty` for negative costs, as in Gymnasium.
+    Their names are `reward_...`, or `..._penalty` for negative costs, like those of Gymnasium.
     """
     infos: list[dict[str, Any]] = []
     for step, (_, reward) in enumerate(_rollout(make(), infos)[1:]):

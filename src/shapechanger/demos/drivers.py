@@ -1,6 +1,6 @@
 """Drivers of recorded episodes: an expert, a policy, or a policy with corrections.
 
-With corrections the policy drives, and an expert takes over where it goes wrong: M. Kelly et al.,
+With corrections the policy drives, and an expert takes over when it goes wrong: M. Kelly et al.,
 "HG-DAgger: Interactive Imitation Learning with Human Experts", ICRA 2019. There a person decides
 when to intervene; here a rule with fixed thresholds does.
 """
@@ -85,7 +85,7 @@ class Pilot:
             meant, right = self._expert.act()
         if self._act is None:
             if right is None:
-                raise DemosError("Nobody drives: give a policy, an expert, or both.")
+                raise DemosError("No driver was given: give a policy, an expert, or both.")
             return right, Step(action=row(meant), driver="expert"), ""
         wanted, remark = self._act(observation), ""
         if meant is not None:

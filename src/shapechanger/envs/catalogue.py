@@ -1,4 +1,4 @@
-"""All envs by name: their ids, registered without importing a simulator, and names that users give.
+"""Ids of all envs, registered without importing a simulator, and names that users give.
 
 Users name an env by its id, a short name such as `BigAnt`, `module:id`, or the file of a robot.
 """

@@ -25,8 +25,8 @@ kept it.
 
 `odrl.json` has the edits, keyed by names such as `odrl-ant-friction-0.1`. Frictions apply to all
 geoms, except the hopper's floor; gravity is a factor of 9.81 m/s²; easy, medium and hard leave 0.8,
-0.5 and 0.2 of the range of a joint. One foot of a walker has less friction than the other, as in
-Gym; Gymnasium's v5 has made them equal.
+0.5 and 0.2 of the range of a joint. One foot of a walker has less friction than the other, like
+Gym's; Gymnasium's v5 has made them equal.
 """
 
 from __future__ import annotations

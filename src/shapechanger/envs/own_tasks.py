@@ -48,7 +48,7 @@ class RobotState:
         standing_height: Height of the trunk above the floor when it stands, m; None for a robot
             that does not stand.
         can_travel: Whether the trunk has a free joint, or a slide without limits on the world.
-        numbers: Function that returns any number that can be observed, by its name.
+        numbers: Function that returns any number that can be observed, given its name.
         floor: Height in the world of the floor below the start, m; 0 without a floor.
     """
 

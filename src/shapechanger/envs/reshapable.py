@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
 
 # Distance of a camera that follows a body, in multiples of its reach: 3.5 m for the ant; and of a
-# fixed camera: 2.04 m for the inverted pendulum, as in Gymnasium.
+# fixed camera: 2.04 m for the inverted pendulum, like Gymnasium's.
 _FOLLOWING_PER_REACH: Final = 3.0
 _FIXED_PER_REACH: Final = 4.1
 BAD_STATE: Final = slice(

@@ -73,9 +73,9 @@ Biomechanics 29:443) found losses that hardly grow with speed."""
 # of a cadaver's index finger exerts at the fingertip (R/main.r of github.com/bc/stfeasibility), in
 # an unspecified posture. FDS and DI have no moment arm at the end joint, so their forces and
 # torques determine the fingertip's distance from it, 16 mm, and its flexion, 10 degrees. For the
-# arms below, the knuckle and the middle joint are assumed to be flexed by 45 degrees, as in other
-# work of the laboratory. A different posture causes small errors. The often quoted arms of An et
-# al. 1983 (J. Biomechanics 16:419) differ by up to 4 mm; see `AN_1983_ARMS`.
+# arms below, the knuckle and the middle joint are assumed to be flexed by 45 degrees, which other
+# work of the laboratory assumes too. A different posture causes small errors. The often quoted arms
+# of An et al. 1983 (J. Biomechanics 16:419) differ by up to 4 mm; see `AN_1983_ARMS`.
 _MOMENT_ARMS_MM: Final = {
     "FDP": (8.6, -2.7, 4.9, 3.6),
     "FDS": (9.0, -1.3, 4.0, 0.0),

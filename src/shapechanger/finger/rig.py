@@ -26,7 +26,7 @@ class RigSenses:
     """Reads the state of a rig, and converts tensions to its commands.
 
     With encoders at the joints, angles are measured, and velocities are smoothed differences over
-    one control period, as in `FingerPlant` with noisy joints. Otherwise angles are fitted to the
+    one control period, like `FingerPlant`'s with noisy joints. Otherwise angles are fitted to the
     seven lengths by least squares, with corrections for stretch, the nominal moment arms and the
     ranges of the joints, and velocities are computed from the speeds of the tendons. `least` and
     `most` are the tensions at the commands 0 and 1, N, (7,). If the rig `controls_length`, commands

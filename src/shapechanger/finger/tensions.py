@@ -153,7 +153,7 @@ def tensions_for_torque(
     """Tensions that give a torque, or the nearest possible one, with the least co-contraction.
 
     Moment arms are in m, (tendons, joints), the torque in N·m, (joints,), and the smallest and
-    largest tensions in N, numbers or (tendons,). The second result says whether the tensions, N,
+    largest tensions in N, numbers or (tendons,). The second result is whether the tensions, N,
     give the torque to within 1 µN·m.
     """
     r = np.asarray(arms, np.float64)

@@ -114,7 +114,7 @@ def travelling_body(model: mujoco.MjModel) -> int | None:
     """Return the index of the robot's body that can travel; None if no body can.
 
     This is the body with the robot's free joint or, if it has none, the body on the world with its
-    first slide without limits, as in runners in a plane. Free objects are not part of the robot,
+    first slide without limits (runners in a plane). Free objects are not part of the robot,
     see `robot_bodies`. Of several free robots, the one that most actuators move is used.
     """
     joints = _travelling_joints(model)

@@ -41,7 +41,7 @@ def count(value: float) -> str:
 def interval_text(
     value: float | None, low: float | None, high: float | None, *, signed: bool = False
 ) -> str:
-    """Format an estimate, None if undefined, with its interval, as in `+0.31 [+0.22, +0.40]`."""
+    """Format an estimate, None if undefined, with its interval, like `+0.31 [+0.22, +0.40]`."""
     if value is None:
         return UNDEFINED
     if low is None or high is None:
@@ -111,7 +111,7 @@ def t_interval(samples: NDArray[np.float64]) -> SeedMean:
 
 
 def spread_text(values: NDArray[np.float64]) -> str:
-    """Format the mean of values, (n_seeds,), with its t-interval, as in `950 [900, 1,000]`."""
+    """Format the mean of values, (n_seeds,), with its t-interval, such as `950 [900, 1,000]`."""
     if values.size == 1:
         return interval_text(float(values[0]), None, None)
     mean, low, high = (float(x[0]) for x in t_interval(values[:, np.newaxis]))
@@ -119,7 +119,7 @@ def spread_text(values: NDArray[np.float64]) -> str:
 
 
 def share_text(shares: NDArray[np.float64]) -> str:
-    """Format the mean of shares, (n_seeds,), each from 0 to 1, as in `85 % [71 %, 99 %]`.
+    """Format the mean of shares, (n_seeds,), each from 0 to 1, such as `85 % [71 %, 99 %]`.
 
     The t-interval over seeds is clipped to 0 and 1. Without shares, the text is empty.
     """

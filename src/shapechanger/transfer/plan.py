@@ -221,7 +221,7 @@ def read_plan(out: Path, remedy: str) -> Plan:
         except UnknownName as error:
             raise StudyError(
                 f"{out} compares the method {arm}, whose module is not found from {Path.cwd()}: go "
-                "to the folder that the study was started in, or install the method; nothing was "
+                "to the folder that the study was started in, or install the method; no file was "
                 f"changed. {error}"
             ) from error
     return read_json(out / PLAN_FILE, Plan, remedy)

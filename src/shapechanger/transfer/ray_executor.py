@@ -52,10 +52,10 @@ class RayCluster(Executor):
                         f"{self._address!r}."
                     )
                 place = host.strip("[]"), int(port)
-                try:  # Where nothing listens, Ray would retry for 30 s.
+                try:  # Without an answer, Ray would retry for 30 s.
                     socket.create_connection(place, timeout=_CONNECT_S).close()
                 except (OSError, OverflowError) as error:
-                    raise _no_answer(self._address, "nothing listens there") from error
+                    raise _no_answer(self._address, "no program listens there") from error
             try:
                 _ray.init(address=self._address, logging_level="ERROR", log_to_driver=False)
             except (ConnectionError, ValueError, RuntimeError, RayError) as error:

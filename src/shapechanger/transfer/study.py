@@ -59,7 +59,7 @@ STUDY_FILE: Final = "study.json"
 _ADAPTED: Final = ("randomised", "identified")
 # Packages that the numbers depend on.
 _PACKAGES: Final = ("numpy", "scipy", "gymnasium", "mujoco", "torch", "stable-baselines3")
-_KEPT: Final = "give another --out, or delete that folder to start again; nothing was changed"
+_KEPT: Final = "give another --out, or delete that folder to start again; no file was changed"
 
 
 class Study(msgspec.Struct, frozen=True, kw_only=True):

@@ -82,7 +82,7 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
             text = changes_between(whole, plan) or f"they differ in {whole.difference(plan)}"
             raise ForeignStudy(
                 f"{folders[0]} and {folder} hold different studies ({text}). Merge only folders of "
-                "one version; nothing was changed."
+                "one version; no file was changed."
             )
     claim_folder(whole, out)
     for run in whole.runs():

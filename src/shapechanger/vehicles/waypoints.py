@@ -356,7 +356,7 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
     """Convert demonstrations of steering and throttle, with rectified images, to waypoints.
 
     Steps that do not determine a waypoint are left out; see `waypoints_of`. Without a `response`,
-    it is fitted to the recorded motion. Raises a DemosError if nothing can be converted.
+    it is fitted to the recorded motion. Raises a DemosError if no step can be converted.
     """
     names = data.action_layout.names
     if names != ("steering", "throttle"):

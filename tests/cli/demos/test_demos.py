@@ -130,7 +130,7 @@ def test_repair_keeps_complete_steps(data: Path, demos: Cli) -> None:
     printed = demos.output("repair", data)
     assert f"{first.name}: kept 30 steps, moved a line aside, because it is cut off" in printed
     assert f"{second.name}: kept 9 steps, moved a line aside" in printed
-    assert demos.output("repair", data).count("nothing was wrong") == 2
+    assert demos.output("repair", data).count("found no damage") == 2
 
 
 def test_one_episode_must_be_named(data: Path, demos: Cli) -> None:
@@ -277,7 +277,7 @@ def test_ctrl_c_leaves_complete_episodes(
 def test_a_partial_import_has_a_separate_exit_code(
     tmp_path: Path, demos: Cli, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The exit code is 0 if all is imported, 3 for a part and 2 for nothing."""
+    """The exit code is 0 if all is imported, 3 for a part and 2 if all failed."""
     fields = {"user/angle": 0.0, "user/throttle": 0.0, "lap": 1}
     records = [fields | {"_timestamp_ms": 51 * n} for n in range(30)]
     tub = tub_folder(tmp_path / "tub", records)

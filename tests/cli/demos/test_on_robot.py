@@ -94,7 +94,7 @@ def test_any_key_except_e_ends_the_replay(robot: RunningRobot, tmp_path: Path) -
         start = operator.where().travelled_m
         terminal.read_until("E arms it")
         terminal.press("qe")
-        terminal.read_until("nothing was played")
+        terminal.read_until("no step was played")
         assert terminal.end() == 0
         assert operator.where().travelled_m == start
 

@@ -76,7 +76,7 @@ def test_fetching_copies_exactly_and_later_only_new_data(
     assert "30 steps kept of 40, 1 lines downloaded" in output
     assert "3 steps kept of 3, 4 lines downloaded" in output
     main([*fetch, "--episodes", second.name])
-    assert capsys.readouterr().out == f"{second.name}: 3 steps kept of 3, nothing new\n"
+    assert capsys.readouterr().out == f"{second.name}: 3 steps kept of 3, no new lines\n"
     assert [path.name for path in episodes_of(data)] == [first.name, second.name]
     for path in (first, second):
         assert snapshot(data / path.name) == snapshot(path)

@@ -76,7 +76,7 @@ def test_the_end_of_the_answers_writes_nothing(
 ) -> None:
     _, answers = asked
     answers += ["car", "rover"]
-    with pytest.raises(RobotError, match="nothing was written"):
+    with pytest.raises(RobotError, match="no file was written"):
         RobotInit().run()
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 

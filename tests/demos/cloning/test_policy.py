@@ -164,7 +164,7 @@ _COMPILED = _model("EPContext", "com.microsoft", ep_cache_context="x", source=_P
         (b"\x08\x08garbage", "protobuf parsing failed"),
         (_model(), "no card of Shapechanger"),
         (_model(card="{}"), "missing required field"),
-        (_model(card=msgspec.json.encode(clone_card()).decode()), "its card says"),
+        (_model(card=msgspec.json.encode(clone_card()).decode()), "its card states"),
         # An operator of an accelerator, which onnxruntime does not have.
         (_model("Turbo", domain="com.accelerator"), "com.accelerator:Turbo"),
         (_COMPILED, "not compatible with any execution provider"),

@@ -48,7 +48,7 @@ def test_cut_off_at_any_byte(share: float, tmp_path_factory: pytest.TempPathFact
     torn = content[:cut].rpartition(b"\n")[2]
     assert lost.pop("steps.jsonl", b"") == torn
     assert lost == {f"{n:06d}.jpg": picture(n) for n in range(whole, 5)}
-    assert repair(path) == f"kept {whole} steps, nothing was wrong"
+    assert repair(path) == f"kept {whole} steps, found no damage"
 
 
 @settings(max_examples=40)
@@ -73,7 +73,7 @@ def test_repairing_an_intact_episode_changes_nothing(tmp_path: Path) -> None:
     edit(path, EpisodeMark(1, "a door"))
     edit(path, Drop(2, 3, "bad"))
     before = {p: p.read_bytes() for p in path.rglob("*") if p.is_file()}
-    assert repair(path) == "kept 5 steps, nothing was wrong"
+    assert repair(path) == "kept 5 steps, found no damage"
     assert {p: p.read_bytes() for p in path.rglob("*") if p.is_file()} == before
 
 

@@ -195,7 +195,7 @@ def test_folders_of_unknown_format(tmp_path: Path) -> None:
     """Empty, missing and ambiguous folders, files, and recordings each have an error."""
     out = tmp_path / "data"
     (tmp_path / "empty").mkdir()
-    assert "nothing that can be imported" in refused(tmp_path / "empty", out)
+    assert "cannot be imported: expected" in refused(tmp_path / "empty", out)
     (tmp_path / "file").write_text("x")
     assert "is a file: give its folder" in refused(tmp_path / "file", out)
     assert "does not exist" in refused(tmp_path / "gone", out)

@@ -101,8 +101,8 @@ def every(change: Any) -> Any:
     ("options", "episodes", "reason"),
     [
         # Changes of the video.
-        ({"options": ["-use_editlist", "0", "-bf", "2"]}, [], "says 0 to 0.8 s"),
-        ({"options": ["-output_ts_offset", "0.5"]}, [], "shows 0.5 to 1.3 s where"),
+        ({"options": ["-use_editlist", "0", "-bf", "2"]}, [], "states 0 to 0.8 s"),
+        ({"options": ["-output_ts_offset", "0.5"]}, [], "shows 0.5 to 1.3 s, but"),
         # After a lost image, the later images are shifted, so all episodes are left out.
         ({"pictures": [*range(5), *range(6, 16)]}, [], "shows 0 to 0.75 s where"),
         ({"places": place(0, to_timestamp=0.35)}, [1], "lacks an image at the time"),

@@ -45,7 +45,7 @@ def test_a_bad_action_is_refused(env_id: str, make: Any, sentence: str) -> None:
 
 
 def test_a_large_action_is_accepted() -> None:
-    """A cost of the action that overflows float32 gives a warning, as in Gymnasium."""
+    """A cost of the action that overflows float32 gives a warning, as Gymnasium does."""
     with gym.make("shapechanger/Ant-v1") as ours:
         ours.reset(seed=0)
         with pytest.warns(RuntimeWarning, match="overflow"):

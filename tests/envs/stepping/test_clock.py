@@ -68,7 +68,7 @@ def test_a_clock_of_a_user_keeps_running(user_clock: list[float]) -> None:
 
 def test_the_clock_runs_again_after_the_last_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     """It stays paused while any thread steps; a step that raises counts as ended."""
-    clock = ctypes.c_void_p(4096)  # A made-up address, which nothing calls.
+    clock = ctypes.c_void_p(4096)  # A made-up address, which is never called.
     paused, inside, leave = PausedClock(clock), Event(), Event()
     blank: Any = None
 

@@ -36,7 +36,7 @@ def until_a_fall(envs: WarpVectorEnv) -> Any:
 
 
 def test_same_step_returns_the_start_and_keeps_the_end() -> None:
-    """The last observation and info of an episode are in the infos, as in Gymnasium."""
+    """The last observation and info of an episode are in the infos, like Gymnasium's."""
     envs = pendulums()
     observations, rewards, terminated, _, infos = until_a_fall(envs)
     assert terminated.tolist() == infos["_final_obs"].tolist() == [True, False, False]

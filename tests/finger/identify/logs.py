@@ -27,8 +27,8 @@ def made_up(rows: int = 300) -> FingerLog:
     """Return a log without forces, in which each joint swings at its own rate."""
     t = 0.02 * np.arange(rows, dtype=np.float64)
     angles = np.sin(np.outer(t, [2.0, 3.1, 4.3, 5.7]))
-    nothing = np.zeros((rows, 7))
-    return FingerLog(t, nothing, angles, nothing, nothing, "impedance", 0.02)
+    zeros = np.zeros((rows, 7))
+    return FingerLog(t, zeros, angles, zeros, zeros, "impedance", 0.02)
 
 
 def kinematics(

@@ -93,7 +93,7 @@ def test_an_env_without_a_model_is_refused() -> None:
 
 
 def test_a_difference_beyond_the_rollout_is_stated() -> None:
-    """A model difference without effect in the rollout is a shift, and the verdict says so."""
+    """A model difference without effect in the rollout is a shift, and the verdict states it."""
     target = Swing()
     target.model.jnt_limited[:] = 1
     target.model.jnt_range[:] = (-50.0, 50.0)

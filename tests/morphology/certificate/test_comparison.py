@@ -98,7 +98,7 @@ def _extend(spec: mujoco.MjSpec) -> None:
                 "tip: site added (there)",
             ],
         ),
-        # Friction below the floor's has no effect, as in two hopper tasks of ODRL.
+        # Friction below the floor's has no effect, for example in two hopper tasks of ODRL.
         (lambda s: setattr(s.geom(_SHANK), "friction", [0.2, 0.5, 0.5]), []),
         (lambda _: None, []),
     ],

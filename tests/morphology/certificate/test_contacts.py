@@ -240,7 +240,7 @@ def test_static_and_unsupported_pairs_are_left_out() -> None:
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast", "discrete"])
 @pytest.mark.parametrize("refsafe", ["enable", "disable"])
 def test_contact_stiffness_is_limited_by_the_time_step(integrator: str, refsafe: str) -> None:
-    """Time constants below two time steps are clipped, as in the simulation.
+    """Time constants below two time steps are clipped, as the simulation clips them.
 
     The integrator `discrete` does not clip them, nor does a model with `refsafe` disabled.
     """

@@ -295,7 +295,7 @@ def test_a_stretch_along_an_axis_moves_elements_along_it_only() -> None:
 
 
 def test_a_geom_is_placed_by_its_ends() -> None:
-    """The body's mass and inertia follow, and nothing else moves."""
+    """The body's mass and inertia follow, and no other element moves."""
     edit = PlaceGeom("thigh", (0.0, 0.0, 0.1), (0.0, 0.3, -0.3), radius=0.05)
     before, after = built(leg()), built(leg(), edit)
     assert after.geom("thigh").size[:2] == pytest.approx([0.05, 0.25])

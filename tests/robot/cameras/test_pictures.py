@@ -129,9 +129,9 @@ def test_a_stream_recovers_after_garbage(garbage: bytes) -> None:
 
 
 def test_a_stream_without_frames_is_refused() -> None:
-    for nothing in (jpeg_of()[:-2] + bytes(4 << 20), bytes(2 << 20), b"\xff\xd8\xff\xd9" * 270_000):
+    for stream in (jpeg_of()[:-2] + bytes(4 << 20), bytes(2 << 20), b"\xff\xd8\xff\xd9" * 270_000):
         splitter = JpegSplitter()
-        splitter.feed(nothing)
+        splitter.feed(stream)
         with pytest.raises(RobotError, match="without a complete JPEG"):
             splitter.next()
         splitter.feed(jpeg_of(7))

@@ -55,7 +55,7 @@ def test_an_old_observation_ends_the_link() -> None:
     inbox = Inbox(lambda: 0.0, 1.0)
     inbox.put(seen(10))
     for seq in (10, 5):
-        with pytest.raises(LinkError, match="as in a replay"):
+        with pytest.raises(LinkError, match=": a replay"):
             inbox.put(seen(seq))
 
 

@@ -127,8 +127,8 @@ def test_a_press_is_held_for_its_hold_time(
 
 
 def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    with open(os.devnull) as nothing:
-        monkeypatch.setattr(sys, "stdin", nothing)
+    with open(os.devnull) as null:
+        monkeypatch.setattr(sys, "stdin", null)
         with pytest.raises(NoTerminal, match="needs a terminal"):
             Terminal()
 

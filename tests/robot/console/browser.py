@@ -112,7 +112,7 @@ class Console:
                     operator.place(0)  # In twin time, the car may have reached a wall.
             else:
                 return
-        raise AssertionError(f"Nothing moved, though {key} was held.")
+        raise AssertionError(f"The robot did not move, though {key} was held.")
 
     def stop(self) -> None:
         self.page.keyboard.press("Space")

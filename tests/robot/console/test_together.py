@@ -91,7 +91,7 @@ def test_a_page_reconnects_after_a_restart_without_moving_the_robot(
         console.await_state(link="open")
         console.page.locator("body[data-robot='emergency'], body[data-robot='disarmed']").wait_for()
         assert pins.propels() == 0.0
-        console.await_words("#log", "Nothing moves until you arm it.")
+        console.await_words("#log", "The robot does not move until you arm it.")
         console.page.keyboard.up("w")
         console.arm()
         console.drive("w", pins)

@@ -155,10 +155,10 @@ class Running:
         await client.send(link.Arm(answers=seen.seq, emergency=emergency))
 
     async def armed(self, client: Client) -> None:
-        """Let a client take control and arm, and wait until the daemon knows."""
+        """Let a client take control and arm, and wait until the daemon reports it."""
         await client.obtain()
         await self.arm(client)
-        await until(lambda: self.daemon._hub.state.armed, "it is armed, and the daemon knows")
+        await until(lambda: self.daemon._hub.state.armed, "the daemon's state is armed")
 
 
 @contextlib.asynccontextmanager

@@ -17,7 +17,7 @@ from tests.robot.daemon.running import Running, until
 
 pytestmark = pytest.mark.plan(policies=".")
 
-# Fake process of a policy: prints its robot, and behaves as the policy's name says.
+# Fake process of a policy: prints its robot, and behaves according to the policy's name.
 _PROCESS = """
 import json, sys, time
 task = json.loads(sys.stdin.readline())

@@ -33,10 +33,10 @@ class Fake:
 async def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
     """A served request restarts the timeout; an open link ends it."""
     connections = _listener(max_total=4, max_per_address=2, timeout_s=0.05)
-    page, silent, asks, known = (Fake(name) for name in "aabc")
-    for sock in (page, silent, asks, known):
+    page, silent, asking, known = (Fake(name) for name in "aabc")
+    for sock in (page, silent, asking, known):
         connections.add(id(sock), sock)
-    connections.stop_timer(id(asks))
+    connections.stop_timer(id(asking))
     connections.remove(id(known))
     async with asyncio.timeout(20.0):
         while not silent.dropped:
@@ -47,9 +47,9 @@ async def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
     connections.renew(id(page))
     connections.add("newest", Fake("a"))
     connections.renew("gone")
-    assert [sock.dropped for sock in (page, asks)] == [0, 0]
+    assert [sock.dropped for sock in (page, asking)] == [0, 0]
     await connections.close()
-    assert [sock.dropped for sock in (page, silent, asks, known)] == [1, 1, 1, 0]
+    assert [sock.dropped for sock in (page, silent, asking, known)] == [1, 1, 1, 0]
 
 
 @given(

@@ -52,7 +52,7 @@ async def test_a_step_pairs_an_observation_and_its_command(robot: Running, tmp_p
         assert (began.steps, began.dropped, began.text) == (0, 0, "")
         await drive(robot, program, 1, 2)
         await robot.arm(program)
-        await until(lambda: robot.daemon._hub.state.armed, "it is armed, and the daemon knows")
+        await until(lambda: robot.daemon._hub.state.armed, "the daemon's state is armed")
         seen = await drive(robot, program, 3, 9)
         await person.obtain()
         suggestion = await program.observe()

@@ -28,7 +28,7 @@ class Fault:
     def arm(self, operation: int, takes_effect: bool) -> None:
         """Make operation number `operation`, from 1, fail.
 
-        It may still take effect, as with a late acknowledgement of a chip.
+        It may still take effect, for example if a chip acknowledges it late.
         """
         self._left, self._takes_effect, self.happened = operation, takes_effect, False
 

@@ -140,8 +140,8 @@ class _World(RuleBasedStateMachine):
         seen = max(0, self.emergencies - behind)
         order = Order("arm", issued_ns=self.now_ns - age_ns, emergency=seen, person=person)
         refusal = self.rules.offer(order, self.now_ns)
-        knows = not self.emergency or (person and seen == self.emergencies)
-        assert (age_ns < 1_000 * MS and knows) == (not refusal)
+        aware = not self.emergency or (person and seen == self.emergencies)
+        assert (age_ns < 1_000 * MS and aware) == (not refusal)
         if not refusal:
             self.armed, self.emergency, self.acting = True, False, None
             self.is_empty = self.is_low()

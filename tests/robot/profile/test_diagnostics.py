@@ -28,7 +28,7 @@ control_hz = 25 -> control_hz = "25 Hz" -> a number from 1 to 100, not '25 Hz'
 levels = "three" -> levels = "thre" -> one of 'any', 'three', not 'thre' (did you mean 'three'?)
 seconds = 0.5 -> seconds = true -> seconds of [[reset]] number 2 must be a number above
 size = [128, 128] -> size = [128, 127] -> even number from 16 to 1920, not [128, 127]
-mix.throttle = 0.5 -> mix = "throttle" -> must be a table of numbers from -10 to 10 by
+mix.throttle = 0.5 -> mix = "throttle" -> must be a table of numbers from -10 to 10, ke
 [stop] -> [[stop]] -> [stop] must be a table, not [{
 [sensor.chip]\n -> [sensor]\nchip = 5\n[sensor.chop]\n -> [sensor.chip] must be a table -> chip = 5
 enable = 26 -> enable = 28 -> a BCM pin from 0 to 27, such as 22, "GPIO22" or "BOARD15"
@@ -53,7 +53,7 @@ low = -0.5 -> rest = 0.1 -> rest of [action.throttle] must be 0, because it prop
 slew_per_s = 2 -> slew_down_per_s = 2 -> must be left out, because it propels: a stop is immediate
 unit = "deg"\n ->  -> gain of [action.arm] needs a unit, such as unit = 'deg' -> gain = 90
 [action.arm] -> [action."left arm"] -> the name 'left arm' must begin with a letter
-mix = { arm = 1.0 } -> mix = {} -> is empty, so nothing moves it; there are: steering, th
+mix = { arm = 1.0 } -> mix = {} -> is empty, so no action moves it; there are: steering, th
 mix = { arm = 1.0 } -> mix = { amr = 1.0 } -> no action: 'amr' (did you mean 'arm'?)
 mix = { arm = 1.0 } -> mix = { arm = 0.0 } -> has the weight 0 for 'arm': leave it out
 [output.drive] -> [action.wave]\n[output.drive] -> [action.wave] moves nothing: no mix names it

@@ -2,7 +2,7 @@
 
 The guard and the drivers are the same as in a served robot. `step` sends the guard a command and
 advances one control period. There is no link, no control lease and no deadline to miss; time
-advances only in steps, as with `--clock twin`.
+advances only in steps, the same as with `--clock twin`.
 """
 
 from __future__ import annotations

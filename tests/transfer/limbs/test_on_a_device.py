@@ -187,7 +187,7 @@ def test_probabilities_equal_the_policys(policy: TrainedPolicy) -> None:
 
 
 def test_batches_of_worlds_with_equal_spaces_share_a_tensor() -> None:
-    """Rows and actions of all batches are in one tensor, as in the vector env."""
+    """Rows and actions of all batches are in one tensor, like the vector env's."""
     bodies = ["Swimmer", to_json([JointRange("free_body_rot", -2.0, 2.0)])]
     swimmer = EnvRef("shapechanger/Swimmer-v1")
     envs = shapechanger.make_vec("Swimmer", 2, backend="warp", device="cpu", bodies=bodies)

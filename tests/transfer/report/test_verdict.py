@@ -87,7 +87,7 @@ def test_the_other_arms_have_sentences() -> None:
         "(400) stayed behind scratch; randomised (1,550) came out ahead of scratch; scratch went "
         "from 1.23 to 881 in training."
     )
-    # If there is no interval because all seeds are equal, the verdict says so.
+    # If there is no interval because all seeds are equal, the verdict states it.
     solved = {"scratch": np.tile(1000.0 * SLOPE, (5, 1)), "zero_shot": np.full((5, 1), 1000.0)}
     words = "cannot be judged without an interval"
     assert f"zero-shot (1,000) {words};" in other_arms(make_study(**solved))
@@ -147,9 +147,9 @@ def test_the_verdict_says_when_nobody_learned(study: Study, flat: Study) -> None
     """Without a rise there is no judgement, however far apart the arms are."""
     assert not any(learned(flat, arm) for arm in flat.plan.arms)
     for one in (study, flat):
-        nobody = not any(learned(one, arm) for arm in one.plan.arms)
-        assert verdict(one).startswith("No arm learned in 10,240 target steps: ") == nobody
-        assert not (nobody and JUDGED.search(f"{verdict(one)} {other_arms(one)}"))
+        unlearned = not any(learned(one, arm) for arm in one.plan.arms)
+        assert verdict(one).startswith("No arm learned in 10,240 target steps: ") == unlearned
+        assert not (unlearned and JUDGED.search(f"{verdict(one)} {other_arms(one)}"))
 
 
 def test_caveats_name_limits_of_the_study() -> None:
@@ -283,8 +283,8 @@ def test_arms_by_hand(lines: Study) -> None:
     assert rows["source"].good == ""
     assert scratch.terms == {}
     low = rising(-900.0, -900.0, 1e3)
-    nobody = make_study(scratch=low, fine_tune=low, zero_shot=low[:, :1])
-    assert {row.good for row in arm_rows(nobody)} == {""}
+    unlearned = make_study(scratch=low, fine_tune=low, zero_shot=low[:, :1])
+    assert {row.good for row in arm_rows(unlearned)} == {""}
 
 
 def test_the_source_ends_with_its_last_evaluation(study: Study) -> None:

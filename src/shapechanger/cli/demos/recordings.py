@@ -111,7 +111,7 @@ def _table(found: dict[Path, Episode | DemosError]) -> Table:
 
 @dataclass(frozen=True)
 class DemosEdit:
-    """Drop, restore or mark steps of an episode; nothing is deleted."""
+    """Drop, restore or mark steps of an episode; no data is deleted."""
 
     change: Annotated[Change, tyro.conf.Positional]
     """cut drops the steps outside the range; bad drops the range, good restores it; mark marks the
@@ -156,7 +156,7 @@ class DemosEdit:
 
 @dataclass(frozen=True)
 class DemosMerge:
-    """Copy the episodes of several recordings into one; nothing is overwritten."""
+    """Copy the episodes of several recordings into one; no file is overwritten."""
 
     data: Annotated[
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="DATA [DATA ...]")
@@ -207,7 +207,7 @@ class DemosImport:
     """Import a recording from another format, leaving the source unchanged.
 
     Complete parts are imported, and the rest is listed. The exit code is 0 if all was imported, 3
-    if parts were left out, and 2 if nothing could be imported.
+    if parts were left out, and 2 if no part could be imported.
     """
 
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FROM")]

@@ -86,7 +86,7 @@ class RobotCalibrate:
                     change_profile(path, calibration.found)
                 raise
         if not calibration.found:
-            say("No results; nothing was written.")
+            say("No results; the profile was not changed.")
             return
         calibration.found["robot.calibrated"] = datetime.date.today()
         change_profile(path, calibration.found)
@@ -133,7 +133,7 @@ class Calibration:
     def run(self) -> None:
         """Calibrate everything; `found` is empty if the person quits."""
         say(
-            "Lift the robot so that nothing can drive away. Enter accepts, N skips this output, "
+            "Lift the robot so that it cannot drive away. Enter accepts, N skips this output, "
             "Q ends without writing, and Space and Escape stop everything and end without writing."
         )
         try:
@@ -296,4 +296,4 @@ def ask_for_wheels_up() -> None:
         raise RobotError("The robot will drive: lift its wheels, and confirm with --wheels-up.")
     answer = input("The robot will drive. Are its wheels off the ground? [yes/no] ")
     if answer.strip().lower() != "yes":
-        raise RobotError("Nothing was moved.")
+        raise RobotError("The robot was not moved.")

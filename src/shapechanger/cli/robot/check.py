@@ -39,7 +39,7 @@ class RobotCheck:
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
     wiring: bool = False
-    """Move nothing: check the computer, the settings and the wires, and list the pins with their
+    """Move no output: check the computer, the settings and the wires, and list the pins with their
     positions on the header."""
     leds: bool = False
     """Check a Raspberry Pi with LEDs instead of motors: light each LED, cause faults, and write a
@@ -84,7 +84,7 @@ class RobotCheck:
             f"{platform.platform()}"
         )
 
-        asks = sys.stdin.isatty() and not (self.yes or on_twin)
+        interactive = sys.stdin.isatty() and not (self.yes or on_twin)
         bench = Bench(
             profile,
             twin=on_twin,
@@ -93,11 +93,11 @@ class RobotCheck:
             # The client that drives during the faults is a program, not a person.
             arguments=("--arm-by-program",) if self.leds and not on_twin else (),
             pilot=_PILOT,
-            ask=ask_person if asks else lambda _: None,
+            ask=ask_person if interactive else lambda _: None,
         )
         require_level(level, bench)
         if not on_twin and not self.wiring:
-            self._require_consent(profile, asks=asks)
+            self._require_consent(profile, interactive=interactive)
         standing = StandingRobot(
             profile,
             port=0 if self.leds or on_twin else self.port,
@@ -148,19 +148,19 @@ class RobotCheck:
             raise RobotError(f"--trials must be at least 1, got {self.trials}.")
         return level
 
-    def _require_consent(self, profile: Profile, *, asks: bool) -> None:
+    def _require_consent(self, profile: Profile, *, interactive: bool) -> None:
         if not self.leds and not self.wheels_up:
             ask_for_wheels_up()
         if self.jumper is not None:
             say(f"{MARKS['good']}  jumper: {check_jumper(*self.jumper, profile)}")
         require_pins(profile)
-        if self.leds and not (asks or self.yes):
+        if self.leds and not (interactive or self.yes):
             raise RobotError(
                 "All outputs will be driven: replace the motors by LEDs, and confirm with --yes."
             )
         question = "All outputs will be driven. Is every motor taken off?"
-        if self.leds and asks and not ask_person(question):
-            raise RobotError("Nothing was lit.")
+        if self.leds and interactive and not ask_person(question):
+            raise RobotError("No LED was lit.")
 
 
 def ask_person(question: str) -> bool | None:

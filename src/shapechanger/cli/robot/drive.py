@@ -287,7 +287,7 @@ class Driving:
             f"cap {self._cap:.1f}",
             recording,
             self._values(seen.action_applied),
-            f"{seen.suggested_by} wants {self._values(seen.suggested)}" if seen.suggested else "",
+            f"{seen.suggested_by} chose {self._values(seen.suggested)}" if seen.suggested else "",
             senses,
             self._note or seen.stop_reason or remark or ("" if seen.mine else pilot_note),
         ]

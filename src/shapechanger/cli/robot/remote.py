@@ -142,7 +142,7 @@ class RobotFetch:
         with RobotClient.connect(recall(self.robot), frames=False) as robot:
             there = episodes_there(robot, self.episodes)
             if not there:
-                say(f"{self.robot} has recorded nothing yet.")
+                say(f"{self.robot} has no recordings yet.")
             for episode in there:
                 busy = robot.recorder
                 if busy is not None and busy.recording and busy.episode == episode.id:
@@ -154,7 +154,7 @@ class RobotFetch:
                     failed += 1
                     say(f"{episode.id}: {error}", stderr=True)
                     continue
-                news = f"{came} lines downloaded" if came else "nothing new"
+                news = f"{came} lines downloaded" if came else "no new lines"
                 if own:
                     news += f", {counted(own, 'edit')} made here kept"
                 say(f"{episode.id}: {episode.kept} steps kept of {episode.steps}, {news}")

@@ -105,7 +105,7 @@ class RobotInit:
                 question = "Install it now, with sudo, to start with the computer"
                 installs = ask(question, "yes", "yes", "no") == "yes"
         except EOFError:
-            raise RobotError("No more answers: nothing was written.") from None
+            raise RobotError("No more answers: no file was written.") from None
         chosen: Any = {
             "camera": "" if camera == has else camera,
             "arming": "" if arming == stated.arming else arming,
@@ -265,7 +265,7 @@ class RobotInstall:
         path = profile.path.absolute()
         unit = path.parent / unit_name(profile.name)
         if not unit.exists() and self.dry_run:
-            # Usually `robot init` has written the unit. With --dry-run, nothing may be written.
+            # Usually `robot init` has written the unit. With --dry-run, no file may be written.
             raise RobotError(f"{unit} does not exist; without --dry-run, this command writes it.")
         unit, _ = write_unit(profile.name, path, self.credentials, user)
         text = unit.read_text(errors="replace")

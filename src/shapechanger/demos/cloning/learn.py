@@ -197,7 +197,7 @@ def _card(
     unseen = tuple(name for name in names if name.endswith(_APPLIED))
     if names and len(unseen) == len(names):
         raise DemosError(
-            "The state contains only the previous action, from which nothing can be learned."
+            "The state contains only the previous action, from which no policy can be learned."
         )
     net = CloneNetwork(
         framing=settings.framing,

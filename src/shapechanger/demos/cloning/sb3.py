@@ -105,7 +105,7 @@ def as_sac(
         raise PolicyError(f"{text}: use PPO, or train the policy with --head regression.")
     settings = {"learning_starts": 0, "buffer_size": _BUFFER, "device": "cpu", **settings}
     kwargs = _perception(policy) | {
-        # No layer between features and actions, as in the policy.
+        # Like the policy, it has no layer between features and actions.
         "net_arch": {"pi": [], "qf": [256, 256]},
         "activation_fn": NormedReLU,
         "share_features_extractor": True,

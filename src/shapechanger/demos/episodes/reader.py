@@ -266,7 +266,7 @@ def _checked_lines(
 
 
 def episodes_of(data: Path) -> tuple[Path, ...]:
-    """Return the folders of the episodes of a recording, by name: oldest first unless renamed.
+    """Return the folders of the episodes of a recording by name: oldest first unless renamed.
 
     Args:
         data: Folder of a recording, or of one episode.
@@ -339,7 +339,7 @@ def repair(path: Path) -> str:
         if outcome is None:
             write_header(path, header, {"steps": len(kept), "outcome": "cut off"})
             done.append("closed it")
-    return ", ".join([f"kept {len(kept)} steps", *(done or ["nothing was wrong"])])
+    return ", ".join([f"kept {len(kept)} steps", *(done or ["found no damage"])])
 
 
 def edit(path: Path, line: Edit) -> None:
@@ -367,7 +367,7 @@ def edit(path: Path, line: Edit) -> None:
 
 
 def merge(sources: Sequence[Path], out: Path) -> list[tuple[Path, Path]]:
-    """Copy episodes into one recording; the sources are not changed, and nothing is overwritten.
+    """Copy episodes into one recording; the sources are not changed, and no file is overwritten.
 
     All episodes are read before the first one is copied. A taken name gets the next free number.
 

@@ -179,7 +179,7 @@ Driver = Literal["person", "policy", "expert", "program"]
 
 DRIVERS: Final[tuple[Driver, ...]] = ("person", "policy", "expert", "program")
 
-# The sum of two such numbers fits into 64 bits, as in NumPy and other formats.
+# The sum of two such numbers fits into the 64-bit integers of NumPy and other formats.
 _Integer = Annotated[int, Meta(ge=-(1 << 62), le=1 << 62)]
 
 

@@ -316,7 +316,7 @@ def find_format(path: Path) -> str:
     if any(map(is_episode, (path, *path.iterdir()))):
         raise DemosError(f"{path} is a recording already: use it as it is.")
     signs = [f"{form.sign} ({name})" for name, form in formats().items() if form.read]
-    raise DemosError(f"{path} has nothing that can be imported: expected {' or '.join(signs)}.")
+    raise DemosError(f"{path} cannot be imported: expected {' or '.join(signs)}.")
 
 
 def _formats_of(path: Path) -> list[str]:

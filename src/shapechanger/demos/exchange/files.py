@@ -163,7 +163,7 @@ def _pixels(data: bytes) -> NDArray[np.uint8] | None:
 
 
 def converted(plain: Any, kind: Any, where: object, *, strict: bool = True) -> Any:
-    """Convert a value to a type that msgspec knows; `where` names its source in errors."""
+    """Convert a value to a type that msgspec supports; `where` names its source in errors."""
     return files.converted(plain, kind, DemosError, f"{where} is damaged", strict=strict)
 
 
@@ -195,7 +195,7 @@ def own_episodes(
     """Return the header, the outcome and the drivers of each episode that Shapechanger exported.
 
     `section` is their part of the dataset's metadata. It must have `count` episodes, with layouts
-    and images of the sizes in `found`. For None, as in datasets of other programs, [] is returned.
+    and images of the sizes in `found`. For None (datasets of other programs), [] is returned.
     """
     if section is None:
         return []

@@ -238,7 +238,7 @@ class _Dataset:
         stated_s = spans_s[[0, -1], [0, 1]]
         lost_s = (shown_s - stated_s) * [1.0, -1.0]  # Missing time at the start and at the end.
         (first, last), (start, end) = shown_s, stated_s
-        about = f"{name} shows {first:.4g} to {last:.4g} s where {EPISODES} says "
+        about = f"{name} shows {first:.4g} to {last:.4g} s, but {EPISODES} states "
         about += f"{start:.4g} to {end:.4g} s"
         # After a lost image, the later images are shifted, and it is unknown which one was lost.
         if lost_s.max() > half_s:

@@ -13,7 +13,7 @@ With `images`, the images are in the table instead of videos. Actions, states an
 bits. A state that was not measured becomes the middle of its range, because one NaN would make all
 statistics of a dataset NaN.
 
-Statistics have LeRobot's keys (`compute_stats.py` of lerobot 0.4.4); docs/exchange.md says where
+Statistics have LeRobot's keys (`compute_stats.py` of lerobot 0.4.4); docs/exchange.md lists how
 their numbers differ.
 """
 

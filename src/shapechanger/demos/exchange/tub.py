@@ -1,8 +1,8 @@
 """Donkeycar tubs: import of versions 1 and 2, export of version 2.
 
-`user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, as in
-Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is the action that a policy
-proposed. In other modes the policy drives, but in "local_angle" the person sets the throttle.
+`user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, with
+Shapechanger's signs. In the `user/mode` "user" a person drives, and `pilot/...` is the action that
+a policy proposed. Otherwise the policy drives, but in "local_angle" the person sets the throttle.
 
 Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
 metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted

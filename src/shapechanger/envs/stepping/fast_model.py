@@ -103,7 +103,7 @@ def _with_pairs(
             return None
     for parameter, values in mixed_parameters(result, geoms_of_pairs(result)).items():
         getattr(result, f"pair_{parameter}")[:] = values
-    # Exclude all geoms from the search, by their bits and by the bits of their bodies.
+    # Exclude all geoms from the search, using their bits and the bits of their bodies.
     result.geom_contype[:] = result.geom_conaffinity[:] = 0
     result.body_contype[:] = result.body_conaffinity[:] = 0
     return result
@@ -157,7 +157,7 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
         for data in (one, two):
             mujoco.mj_resetData(model, data)
             data.qpos[:], data.qvel[:] = pose, speed
-            mujoco.mj_forward(model, data)  # With the original model, as in a reset.
+            mujoco.mj_forward(model, data)  # With the original model, like a reset.
         for _ in range(_STEPS):
             action = rng.uniform(-1.0, 1.0, model.nu)
             for stepping, data in ((model, one), (other, two)):

@@ -62,7 +62,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         num_envs: Number of worlds.
         device: Name of the device, such as `cuda:0`.
         redraws: Whether `bodies` is a pool, of which each start of an episode draws one.
-        limits: The limits `nconmax` and `njmax`, as in `make_vec`.
+        limits: The limits `nconmax` and `njmax`; see `make_vec`.
         task_infos: Whether steps return the infos of the CPU env.
 
     Attributes:

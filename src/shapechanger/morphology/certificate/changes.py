@@ -161,7 +161,7 @@ def _lengths(
 ) -> tuple[list[_Row], set[str]]:
     """Return lengths, without caps, and radii of round geoms in both models, and the geoms' names.
 
-    A geom that touches nothing is reported only if its body differs. The only geom of a body is
+    A geom that touches no other is reported only if its body differs. The only geom of a body is
     reported under the body's name.
     """
     found, measured = list[_Row](), set[str]()

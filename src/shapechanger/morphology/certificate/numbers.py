@@ -1,8 +1,8 @@
 """Numbers of a compiled model, read by the table `fields.toml`, and its contacts.
 
 A number is left out if the condition of its array does not hold for the element. Elements without
-an effect are left out too: geoms that touch nothing, guide no tendon and feel no fluid, sites that
-nothing uses, and bodies without joint or moving mass that carry only such elements. Joints and
+an effect are left out too: geoms that touch no other geom, guide no tendon and feel no fluid,
+unused sites, and bodies without joint or moving mass that carry only such elements. Joints and
 actuators are in the model's order, as are the numbers of state and control; all other elements are
 sorted by name.
 

@@ -30,7 +30,7 @@ Ratio = Annotated[float, msgspec.Meta(ge=0.01, le=100.0)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 
 EDITS: Final[dict[str, type[Edit]]] = {}
-"""The kinds of edits by their names in JSON; a subclass of `Edit` with an `apply` adds itself."""
+"""The kinds of edits, keyed by name in JSON; a subclass of `Edit` with an `apply` adds itself."""
 
 
 def _tag(class_name: str) -> str:

@@ -203,7 +203,7 @@ class Cut(Edit, frozen=True):
         if not any(piece.share for _, piece in pieces):
             raise MorphologyError(
                 f"No geom of {body.name!r} lies within {self.keep:g} of its length, so "
-                "nothing would be left of it: keep more."
+                "no geom would be left: keep more."
             )
         for geom, piece in pieces:
             if not piece.share:

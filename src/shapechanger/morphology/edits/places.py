@@ -84,7 +84,7 @@ def _reshaped(spec: mujoco.MjSpec, pattern: str, factor: float) -> Iterator[mujo
     """Yield the bodies that match, without their skins; none if the factor is 1."""
     for body in select("body", pattern, spec.bodies[1:]):
         geometry.require_geometry(spec, body)
-        if factor != 1.0:  # Avoid rounding if nothing moves.
+        if factor != 1.0:  # Avoid rounding without a change.
             references.release_drawings(spec, {references.key_of(body)})
             yield body
 

@@ -63,7 +63,7 @@ class Mass(ValueEdit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every body that matches."""
-        # Only the compiler knows the volume of every shape.
+        # Only the compiler computes the volume of every shape.
         whole = compiled(spec) if self.to is not None else None
         for body in select("body", self.element, spec.bodies[1:]):
             # Keyed by name, because an earlier edit may have changed the indices of the bodies.

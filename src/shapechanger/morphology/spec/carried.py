@@ -330,7 +330,7 @@ def _shift_coupling(equality: mujoco.MjsEquality, changes: dict[Element, float])
         data = np.array(equality.data)
         if not equality.name2:
             data[1:5] = 0.0
-        # p(x + d) from p(x), by its Taylor series.
+        # p(x + d) from p(x), with its Taylor series.
         polynomial = np.polynomial.Polynomial(data[:5])
         data[:5] = [polynomial.deriv(n)(by_leader) / math.factorial(n) for n in range(5)]
         data[0] -= by_follower

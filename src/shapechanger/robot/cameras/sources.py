@@ -125,7 +125,7 @@ class Pipe(Camera):
 
 
 class Folder(Camera):
-    """Camera that replays the JPEG files of the folder `path` by name, again and again."""
+    """Camera that replays the JPEG files of the folder `path`, sorted by name, in a loop."""
 
     def __init__(self, plan: CameraPlan) -> None:
         super().__init__(plan)

@@ -44,7 +44,7 @@ class RobotClient(Inbox):
 
     All methods may be called from any thread. Those that wait for an answer raise `RobotRefused` if
     the robot refuses, and `LinkError` if no answer arrives in time. Those that send raise
-    `LinkError` if the link is lost; `refusal` tells whether a command was refused.
+    `LinkError` if the link is lost; `refusal` states whether a command was refused.
 
     Attributes:
         welcome: Description of the robot.
@@ -231,7 +231,7 @@ class RobotClient(Inbox):
 
         Raises:
             RobotRefused: If the robot cannot record, for example on a full disk, records already,
-                or has nothing to end.
+                or has no episode to end.
         """
         return self._ask(
             messages.Record(on=on, name=name),

@@ -181,7 +181,7 @@ class Inbox:
                 case messages.Observation():
                     if message.seq <= self.seq:
                         raise LinkError(
-                            f"Observation {message.seq} arrived after {self.seq}, as in a replay."
+                            f"Observation {message.seq} arrived after {self.seq}: a replay."
                         )
                     last, jpeg = self.newest, message.frame
                     if jpeg is None and last and message.frame_seq == last.message.frame_seq:

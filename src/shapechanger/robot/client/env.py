@@ -101,7 +101,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         robot: Name of a known robot, or its address, HOST or HOST:PORT.
         key: The robot's key, for an address.
         fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
-        size: Width and height of the images, pixels, such as (128, 128), as in this project's
+        size: Width and height of the images, pixels, such as (128, 128), the size of this project's
             original release of 2017; see `resize_picture`. None for the camera's size.
         state: Whether observations have the state in addition to the image.
         image: Whether observations have an image; by default, if the robot has a camera.

@@ -27,7 +27,7 @@ def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
     """Resize an image to width and height, pixels; return it as it is if it has this size.
 
     If width and height shrink by integer factors, each pixel is the rounded mean of its box.
-    Otherwise each pixel is the nearest pixel of the original. Nothing is cropped, so a change of
+    Otherwise each pixel is the nearest pixel of the original. No part is cropped, so a change of
     proportions stretches the image.
     """
     height, width = picture.shape[:2]

@@ -190,7 +190,7 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
         while not (keys := terminal.keys(0.5)):
             robot.acknowledge()  # Keeps the link alive.
         if keys != ["e"]:
-            say("cancelled; nothing was played")
+            say("cancelled; no step was played")
             return
         with contextlib.ExitStack() as leaving:
             leaving.callback(lambda: (robot.disarm(), robot.release()) if robot.alive else None)

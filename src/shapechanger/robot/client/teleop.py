@@ -171,7 +171,7 @@ class KeyParser:
 
     @property
     def due_s(self) -> float:
-        """Time at which `expire` returns keys, s; infinity if nothing is pending."""
+        """Time at which `expire` returns keys, s; infinity if no key is pending."""
         if not self._text:
             return math.inf
         is_alone = self._text == _ESCAPE and not self._is_reported

@@ -122,7 +122,7 @@ link.addEventListener("welcome", ({ detail: welcome }) => {
   setText(find("picture-state"), welcome.image_size ? "No picture yet." : "This robot has no camera.");
   view("drive");
   if (!wasConnected) find("stage").focus({ preventScroll: true });
-  log.add(wasConnected ? "Connected again. Nothing moves until you arm it." : `Connected to ${welcome.robot}.`);
+  log.add(wasConnected ? "Connected again. The robot does not move until you arm it." : `Connected to ${welcome.robot}.`);
   wasConnected = true;
   driver.hide(document.hidden);
   driver.begin();

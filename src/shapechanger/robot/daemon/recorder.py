@@ -249,7 +249,7 @@ class Recorder:
     def _recorded(self) -> _Episode:
         """Complete the pending step of the episode that is being recorded, and return it."""
         if self._episode is None or not self.on:
-            raise Declined("Nothing is being recorded.")
+            raise Declined("No episode is being recorded.")
         self._complete()
         return self._episode
 

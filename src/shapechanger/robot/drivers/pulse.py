@@ -89,7 +89,7 @@ class _LgpioKeys(Keys, frozen=True, kw_only=True):
 
 
 class _PinChannel(PulseChannel):
-    """Pulses on a pin, by its factory."""
+    """Pulses on a pin, sent with the pin factory."""
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         self._pin, self._hz = plan.settings["pin"], plan.settings["hz"]

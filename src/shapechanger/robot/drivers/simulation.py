@@ -118,5 +118,5 @@ class SimulatedSensor:
         return []
 
     def output_changed(self, t: int, pin: int, level: float) -> list[Edge]:
-        """Return the edges that an output causes by its new level or duty, 0 to 1."""
+        """Return the edges that an output causes with its new level or duty, 0 to 1."""
         return []

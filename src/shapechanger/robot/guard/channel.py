@@ -66,13 +66,13 @@ class GuardState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         stop_reason: Why no command is applied, or what changes it beyond slew and levels, or "".
         applied: Applied value of each action.
         applied_session: `Order.session` of the applied command; 0 without one.
-        applied_seq: Sequence number of the applied command; None without one, as in a stop.
+        applied_seq: Sequence number of the applied command; None without one, such as in a stop.
         applied_ns: Time at which the outputs first had the applied command, ns; None without one.
         refused: Why the last refused order was refused; empty without a refusal since the last
             state that was sent.
         refused_seq: Sequence number of the refused command; None for other orders.
         outputs: Value of each output, -1 to 1.
-        quantities: Sensor readings in SI units by name, such as "speed" m/s signed, "distance" m,
+        quantities: Sensor readings in SI units, keyed by name: "speed" m/s signed, "distance" m,
             "bump" 0 or 1, "battery" V, "yaw_rate" rad/s, "acceleration_x" m/s2, "temperature" C,
             "stall" 0 or 1, "collision" 0 or 1; without those neither measured nor estimated.
         sources: Source of each quantity: name of a sensor, or "estimated".

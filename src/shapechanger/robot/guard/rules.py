@@ -145,7 +145,7 @@ class OutputDecision:
         release: Whether the outputs are released instead of written.
         stop_reason: Why no command is followed, or what changes it beyond slew and levels, or "".
         session: Session of the command that the robot follows; 0 without one.
-        seq: Sequence number of that command; None without one, as in a stop.
+        seq: Sequence number of that command; None without one, such as in a stop.
     """
 
     actions: tuple[float, ...]
@@ -298,7 +298,7 @@ class Rules:
         self._done = done
 
     def next_wake_ns(self, now_ns: int) -> int:
-        """Return when `tick` is due even if nothing happens, ns."""
+        """Return when `tick` is due at the latest, ns."""
         times = [now_ns + self._period_ns]
         if self._command is not None:
             times.append(self._expiry_ns)

@@ -66,7 +66,7 @@ class ServePlan:
 def plan_fd(plan: ServePlan) -> int:
     """Return an open file with the plan for child processes to inherit; close it afterwards.
 
-    The file is anonymous, so that nothing is left behind; sealed, so that no process can change it;
+    The file is anonymous, so that no file is left behind; sealed, so that no process can change it;
     and in memory, so that a full disk does not keep a robot from starting.
     """
     # Without MFD_CLOEXEC, so that `exec` keeps it open.

@@ -12,7 +12,7 @@ from typing import Final
 from shapechanger.errors import LinkError, RobotError
 
 DEFAULT_PORT: Final = 5000
-"""Default port of a robot, as in the original release (2017)."""
+"""Default port of a robot, unchanged since the original release (2017)."""
 
 SERVICE: Final = "_shapechanger._tcp.local."
 """DNS-SD service type of robots."""

@@ -30,7 +30,7 @@ MAX_PIECE: Final = 256 * 1024
 """Approximate size of a `Piece`, bytes, so that it does not delay observations on a slow radio."""
 
 MAX_EPISODES: Final = 200
-"""Most episodes in one `Recordings`; `Browse.before` asks for older ones."""
+"""Most episodes in one `Recordings`; `Browse.before` requests older ones."""
 
 Role = Literal["person", "program"]
 """Kind of client. A person can take control from a program; a program only if no client has it."""

@@ -117,7 +117,7 @@ class Profile(GuardPlan, RobotTable, CommandTable):
     Attributes:
         path: File of the profile.
         camera: Plan of the camera; None for a robot without a camera.
-        reward: Weights of the reward, as in `Welcome.reward`: "velocity" per metre forward,
+        reward: Weights of the reward, the same as `Welcome.reward`: "velocity" per metre forward,
             "collision" per collision, "stall" per second of stall, and "collision_ends_episode",
             1 or 0.
         reset: The reset routine; empty for none.

@@ -293,7 +293,7 @@ def _check_mix(root: Table, profile: Profile) -> None:
     for output in profile.outputs:
         table = root.table("output", output.name)
         if not output.mix:
-            text = f"is empty, so nothing moves it; there are: {', '.join(rests)}"
+            text = f"is empty, so no action moves it; there are: {', '.join(rests)}"
             raise table.refused("mix", text)
         for name, weight in output.mix.items():
             if name not in rests:

@@ -169,7 +169,7 @@ def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
 
 
 def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) -> dict[str, int]:
-    """Pull all tendons gently until nothing moves, release them, and return the zeros; see `home`.
+    """Pull all tendons gently until they stop, release them, and return the zeros; see `home`.
 
     A person holds the finger straight, and no other process may have the bus open. `wait` waits for
     about 10 ms.

@@ -153,7 +153,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             rules: Rules, keyed by the name or glob of source observation and target action
                 features. A rule is a `Copy`, `Zero`, `Hold` or `Learn`, or one of "zero", "hold"
                 (the middle of the range), "learn" and "copy NAME"; stars in NAME are replaced by
-                the text that the glob's wildcards match, as in
+                the text that the glob's wildcards match, such as
                 `{"foot_*/motor": "copy ankle_*/motor"}`.
             observation_rules: More rules of source observation features, which precede `rules`.
             action_rules: More rules of target action features, which precede `rules`.
@@ -164,7 +164,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
 
         Raises:
             MapError: If a copy has another shape, or another unit and a scale of 1 or -1; if a rule
-                is wrong or changes nothing; or if nothing is copied and a feature has no rule.
+                is wrong or changes nothing; or if no feature is copied and a feature has no rule.
             UnknownName: If a rule matches no feature, or copies one that does not exist.
         """
         shared = dict(rules or {})
@@ -205,7 +205,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
     ) -> BodyMap:
         """Return the map of a body to its mirror image, which swaps left and right.
 
-        The map is its own inverse. Composed with another map, as in `mirror.then(map)`, it makes a
+        The map is its own inverse. Composed with another map (`mirror.then(map)`), it makes a
         policy of the source act as its mirror image. The element of a feature is the part of its
         name before the first "/".
 

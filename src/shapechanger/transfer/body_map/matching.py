@@ -177,7 +177,7 @@ def _suited(rule: Rule, feature: Feature, side: Side, units: Units) -> Rule:
 
 
 def _require_match(side: Side, entries: Sequence[MapEntry]) -> None:
-    """Refuse a side on which nothing matches and not every feature has an explicit rule."""
+    """Refuse a side on which no feature matches and not every feature has an explicit rule."""
     if any(isinstance(e.rule, Copy) for e in entries) or all(e.why != BY_DEFAULT for e in entries):
         return
     into, over = side.into.names, side.over.names

@@ -86,7 +86,7 @@ class TrainedPolicy(Policy):
         model: Model of Stable-Baselines3, with actions from -1 to 1 unless it was trained without
             `shapechanger.transfer.actions`. A loaded model has the weights and settings of the
             trained model, and a new optimiser.
-        normalisation: Statistics of the training; None if it normalised nothing.
+        normalisation: Statistics of the training; None without normalisation.
         card: Provenance of the policy.
     """
 

@@ -50,7 +50,7 @@ class RslVecEnv(RslEnvs):
 
     Observations are in the group `policy`. A world whose episode has ended starts again in the same
     step, and `time_outs` is true for worlds whose episode was truncated without terminating.
-    Actions are clipped to the range from -1 to 1, as in Stable-Baselines3. `rows` are `DeviceRows`
+    Actions are clipped to the range from -1 to 1, like Stable-Baselines3's. `rows` are `DeviceRows`
     for a policy of limbs, or None for the body's observations and actions.
     """
 
@@ -165,7 +165,7 @@ class RslLearner(Sb3Learner):
 
 
 class _Returns:
-    """Discounted returns of worlds, by whose deviation rewards are divided, as in `VecNormalize`.
+    """Discounted returns of worlds, by whose deviation rewards are divided, as `VecNormalize` does.
 
     All tensors stay on the device. Sums have the precision and order of `RunningMeanStd`.
     """

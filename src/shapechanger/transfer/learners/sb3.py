@@ -117,7 +117,7 @@ class Sb3Learner(Learner[Sb3Settings]):
                 on_evaluation(found)
                 return found
 
-            # Skip evaluations that nothing receives: for a finger, they take a third of the time.
+            # Skip evaluations without a recipient: for a finger, they take a third of the time.
             every = math.inf if on_evaluation is ignore else settings.eval_every
             # Evaluate before `learn`, whose first reset changes the running statistics.
             if on_evaluation is not ignore:

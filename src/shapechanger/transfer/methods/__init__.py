@@ -135,7 +135,7 @@ class Method:
     """A transfer method; subclass it and `register` the subclass.
 
     Attributes:
-        name: Name of the method, as in `--arms`.
+        name: Name of the method, which `--arms` takes.
         paper: The publication that describes the method.
         uses_source_policy: Whether the method starts from the source policy of the study.
         uses_source: Whether the method needs source steps, which count in total steps.

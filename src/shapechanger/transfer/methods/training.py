@@ -169,7 +169,7 @@ class _Distillation(BaseCallback):
 
 # Number of prefilled source transitions, as a share of the target steps.
 _PREFILLED: Final = 0.5
-# The classifiers have one hidden layer and noisy inputs, as in the paper. Width, standard deviation
+# The paper's classifiers have one hidden layer and noisy inputs. Width, standard deviation
 # of the noise and size of a batch are not from the paper and were not tuned.
 _WIDTH: Final = 256
 _NOISE: Final = 0.1

@@ -128,7 +128,7 @@ def labels(*envs: EnvRef) -> dict[str, str]:
 
 
 def _label(env: EnvRef, shared: set[str]) -> str:
-    # The file of a user's robot says more than the env's name.
+    # The file of a user's robot is more specific than the env's name.
     name = env.kwargs.get("path", env.id.rpartition("/")[2].removesuffix("-v1"))
     own = [(key, value) for key, value in env.kwargs.items() if key not in {*shared, "path"}]
     return ", ".join([name, *(_argument(key, value) for key, value in own)])

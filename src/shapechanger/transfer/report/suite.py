@@ -109,12 +109,12 @@ def _verdict(studies: Mapping[str, Study]) -> str:
     over = "one study" if len(studies) == 1 else f"{len(studies)} studies"
     sentences: list[str] = []
     if found["too few"] < len(studies):
-        words = (
+        text = (
             f"Over {over}, {arm} is ahead of scratch in {found['up']}, behind in {found['down']}, "
             f"and without a clear difference in {found['unclear']}"
         )
         more = {"unlearned": "neither learned in", "no interval": "there is no interval in"}
-        parts = [words, *(f"{text} {found[one]}" for one, text in more.items() if found[one])]
+        parts = [text, *(f"{label} {found[one]}" for one, label in more.items() if found[one])]
         sentences.append(f"{'; '.join(parts)}.")
     if found["too few"]:
         sentences.append(more_seeds("suite"))

@@ -323,7 +323,7 @@ def more_seeds(what: str) -> str:
 def finding(study: Study) -> str:
     """State in one sentence of about 25 words whether transfer helped.
 
-    With fewer than three seeds the sentence has means only, and if no arm learned, it says so.
+    With fewer than three seeds the sentence has means only, and if no arm learned, it states that.
     """
     arm, plan = study.headline_arm, study.plan
     budget, found = f"{count(plan.steps)} target steps", outcome(study, arm)
@@ -333,12 +333,12 @@ def finding(study: Study) -> str:
         who = f"Neither scratch nor {arm}" if others else "No arm"
         return f"{who} learned in {budget}: scratch's {plan.measure} {scratch}, and {arm}'s {ours}."
     if _is_trained(study, arm):
-        head, words = f"Transfer {_VERBS[found][0]}", f"over {budget} {arm}'s {plan.measure}"
-        words += f" averaged {_height(study, arm)} and scratch's {_height(study, 'scratch')}."
+        head, text = f"Transfer {_VERBS[found][0]}", f"over {budget} {arm}'s {plan.measure}"
+        text += f" averaged {_height(study, arm)} and scratch's {_height(study, 'scratch')}."
     else:
         head = f"{arm.capitalize()} {_VERBS[found][1]}"
-        words = f"{arm}'s {plan.measure} {ours}, and scratch's {scratch} in {budget}."
-    return f"{words[0].upper()}{words[1:]}" if found == "too few" else f"{head}: {words}"
+        text = f"{arm}'s {plan.measure} {ours}, and scratch's {scratch} in {budget}."
+    return f"{text[0].upper()}{text[1:]}" if found == "too few" else f"{head}: {text}"
 
 
 def other_arms(study: Study) -> str:
@@ -413,7 +413,7 @@ def caveats(study: Study) -> tuple[str, ...]:
     if summary.source_steps >= summary.horizon:
         sentences.append(
             f"The source used {source} steps and the budget is {budget}, so in total steps "
-            "nothing is left for the target: only the jumpstart is meaningful there, and the "
+            "no step is left for the target: only the jumpstart is meaningful there, and the "
             "other measures compare no skill with scratch."
         )
     elif summary.source_steps > 0.0:

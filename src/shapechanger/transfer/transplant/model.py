@@ -67,7 +67,7 @@ def _new_model(
     if kept.get("action_noise") is not None and "action_noise" not in changes:
         raise TransplantError(
             "The source model adds action noise in the shape of its actions: state the noise of "
-            "the target, as in transplant(..., action_noise=None)."
+            "the target, for example transplant(..., action_noise=None)."
         )
     kept["policy_kwargs"] = copy.deepcopy(source.policy_kwargs)
     if _is_squashed(source):
@@ -85,7 +85,7 @@ def _new_model(
 
 
 def _is_squashed(model: BaseAlgorithm) -> bool:
-    """Return whether a model's policy squashes its actions to the bounds, as in SAC."""
+    """Return whether a model's policy squashes its actions to the bounds, like SAC's."""
     return isinstance(model.policy, SACPolicy | tqc.TQCPolicy)
 
 

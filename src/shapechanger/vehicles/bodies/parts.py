@@ -166,7 +166,7 @@ HOBBY_MOTOR: Final = DcMotor(
 )
 """Motor of all vehicles, each with a further gear stage."""
 
-# Hitec HS-311 at 4.8 V, by its data sheet: 3.0 kgf·cm, 60 degrees in 0.19 s. The smallest angle
+# Hitec HS-311 at 4.8 V, from its data sheet: 3.0 kgf·cm, 60 degrees in 0.19 s. The smallest angle
 # error at which it gives its full torque is an estimate; cheap servos hold to a few degrees.
 _STALL_TORQUE, _FREE_RATE = 3.0 * _KGF_CM, math.radians(60.0) / 0.19  # N·m and rad/s.
 _ERROR_AT_STALL: Final = math.radians(4.0)

@@ -109,7 +109,7 @@ class _Renderer:
 
 
 class OnboardCamera(_Renderer):
-    """Renders the view of a model's camera by its name, without the geoms of outside views."""
+    """Renders the view of a named camera of a model, without the geoms of outside views."""
 
     def __init__(self, size: tuple[int, int], name: str) -> None:
         super().__init__(size, OUTSIDE_VIEW)

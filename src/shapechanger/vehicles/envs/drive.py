@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from shapechanger.vehicles.envs.demonstrators import Demonstrator, ExpertDriver
 
 Steering = Literal["proportional", "bang"]
-"""Steering angles: any, or only full left, straight and full right, as in 2017."""
+"""Steering angles: any, or only full left, straight and full right, like the car of 2017."""
 
 _LEVELS: Final[dict[str, Literal["any", "three"]]] = {"proportional": "any", "bang": "three"}
 _MAX_PIXELS: Final = 1920  # Limit of a profile.
@@ -273,7 +273,7 @@ class DriveEnv(Page, gym.Env[Any, NDArray[np.float32]], EzPickle):
         raise NotImplementedError
 
     def expert(self) -> ExpertDriver:
-        """Return an expert that knows the whole course; its control rate must be the robot's."""
+        """Return an expert that is given the whole course; its control rate must be the robot's."""
         # Imported here, because experts load SciPy.
         from shapechanger.vehicles.envs.demonstrators import ExpertDriver, require_rate
 

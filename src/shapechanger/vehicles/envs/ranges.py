@@ -100,7 +100,7 @@ def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
 def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
     """Return steering and throttle, (2,), that move a standing vehicle unless the throttle is 0.
 
-    A teacher drives by its mean action. A mean throttle near 0 does not overcome static friction,
+    A teacher drives with its mean action. A mean throttle near 0 does not overcome static friction,
     so the vehicle would never move again; in training, exploration moved it.
     """
     steering, throttle = action

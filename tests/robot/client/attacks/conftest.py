@@ -26,7 +26,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
 
 @pytest.fixture
 def scene(robot: RunningRobot) -> Iterator[Scene]:
-    """The robot, armed by a person who does not command. Nothing may move until the test ends."""
+    """The robot, armed by a person who does not command. It may not move until the test ends."""
     key = key_of(robot)
     before, pids = movements(robot), [robot.pid_of("guard"), robot.pid_of("daemon")]
     with Stranger(robot.port) as operator:

@@ -69,7 +69,7 @@ def test_a_fault_of_one_servo_stops_all(family: str, fault: _Fault, text: str) -
     assert rig.twin("FDP").pulls_a > 0.05
     rig.run(None, 40)
     if rig.bus.mode == "silent":
-        text = "EIP did not confirm the release, so nothing is sent any more"
+        text = "EIP did not confirm the release, so no packet is sent any more"
         assert text in rig.bus.reason
         sent = len(rig.port.sent)
         rig.run(None, 3)
@@ -147,7 +147,7 @@ def test_a_servo_with_a_hardware_error_needs_a_reboot() -> None:
 
 
 def test_servos_stop_without_cycles() -> None:
-    """Servos stop after 100 ms without a packet, and one of the next four cycles says why."""
+    """Servos stop after 100 ms without a packet, and one of the next four cycles reports why."""
     rig = Rig().start()
     rig.run(10.0, 20)
     rig.line.advance(89_000_000)
@@ -169,7 +169,7 @@ def test_without_watchdogs_an_unplugged_adapter_ends_in_silence_at_once() -> Non
     rig.port.is_gone = True
     rig.run(20.0)
     assert rig.bus.mode == "silent"
-    text = "did not confirm the release, so nothing is sent any more: [enable] stops"
+    text = "did not confirm the release, so no packet is sent any more: [enable] stops"
     assert text in rig.bus.reason
     with pytest.raises(RobotError, match="is gone"):
         rig.bus.let_go()

@@ -48,8 +48,8 @@ class ServoPty:
         with contextlib.suppress(OSError):  # The other ends are closed.
             while True:
                 data += os.read(self._host, 4096)
-                # Six bytes tell the size of a Feetech packet. For Dynamixel, `size_of` is above six
-                # until the seventh byte tells the size.
+                # Six bytes give the size of a Feetech packet. For Dynamixel, `size_of` is above six
+                # until the seventh byte gives it.
                 while len(data) >= 6 and len(data) >= (size := wire.size_of(data, family)):
                     answers = wire.execute(self.bus, data[:size])
                     os.write(self._host, b"".join(answers.values()))

@@ -29,7 +29,7 @@ Mode = Literal["off", "held", "stopping", "silent"]
 """Mode of the bus.
 
 "off": no servo has torque. "held": servos pull as requested. "stopping": tensions ramp down, then
-the servos release. "silent": nothing is sent until `set_up`, so that the watchdogs of the servos
+the servos release. "silent": no packet is sent until `set_up`, so that the watchdogs of the servos
 stop them, or the power switch stops servos without a watchdog.
 """
 
@@ -240,7 +240,7 @@ class ServoBus:
                     self.mode = "off"
                     return
         names = ", ".join(one.settings.name for id_, one in self.servos.items() if id_ in holding)
-        silence = f"{names} did not confirm the release, so nothing is sent any more"
+        silence = f"{names} did not confirm the release, so no packet is sent any more"
         who = "the servos' own watchdogs stop" if self._family.has_watchdog else "[enable] stops"
         self._gone = f"{self._gone} {silence}: {who} them.".lstrip()
         self.mode = "silent"

@@ -289,7 +289,7 @@ class TendonServo:
             self._fail(f"has a goal of {value} counts, and was sent {self.goal}")
 
     def _see_tendon(self, length: float, lengthening: float, now_ns: int) -> None:
-        """Detect a lost tendon by its length, m, and the rate of change of the length, m/s."""
+        """Detect a lost tendon from its length, m, and the rate of change of the length, m/s."""
         if length < _SHORTEST_M:
             wound = f"it is wound in by {-1e3 * length:.0f} mm, further than the finger allows"
             self._fail(f"has lost its tendon: {wound}")

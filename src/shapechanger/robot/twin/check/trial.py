@@ -411,7 +411,7 @@ def check_robot(
 ) -> Iterator[tuple[str, Iterator[Finding]]]:
     """Yield the name of each part of a level with an iterator of its findings.
 
-    A part runs, and asks its questions, while its iterator is read.
+    A part runs, and its questions are asked, while its iterator is read.
 
     The part "wiring" moves no output; all other parts drive outputs, and put them at rest at the
     end. `cap`, 0 to 1, is the largest throttle of "driving"; `trials` is the number of trials of
