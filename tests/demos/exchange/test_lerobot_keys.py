@@ -104,7 +104,7 @@ def every(change: Any) -> Any:
         ({"options": ["-use_editlist", "0", "-bf", "2"]}, [], "states 0 to 0.8 s"),
         ({"options": ["-output_ts_offset", "0.5"]}, [], "shows 0.5 to 1.3 s, but"),
         # After a lost image, the later images are shifted, so all episodes are left out.
-        ({"pictures": [*range(5), *range(6, 16)]}, [], "shows 0 to 0.75 s where"),
+        ({"pictures": [*range(5), *range(6, 16)]}, [], "shows 0 to 0.75 s, but"),
         ({"places": place(0, to_timestamp=0.35)}, [1], "lacks an image at the time"),
         ({"places": place(1, from_timestamp=0.35)}, [], "episode 1: Parts of .* overlap"),
         ({"places": place(1, from_timestamp=0.42, to_timestamp=0.82)}, [0], "lacks an image at"),
@@ -147,7 +147,7 @@ def test_contradictions_are_left_out(
     ("options", "warning"),
     [
         ({"info": {"total_episodes": 3}}, r"\(3, 16\) .*, and meta/episodes \(2, 16\)"),
-        ({"pictures": range(18)}, r"more images: .* shows 0 to 0\.9 s where"),
+        ({"pictures": range(18)}, r"more images: .* shows 0 to 0\.9 s, but"),
     ],
 )
 def test_contradictions_that_change_no_step_are_reported(

@@ -262,7 +262,7 @@ _UNKNOWN = "Not forward: the distance ahead is not known."
     ],
 )
 def test_a_near_or_unknown_obstacle_prevents_driving_forward(sensing: Sensing, reason: str) -> None:
-    """Without a limit in the profile, distances prevent nothing."""
+    """Without a limit in the profile, distances prevent no motion."""
     robot = _driving(quick_car(LimitPlan(stop_distance_m=0.3)))
     robot.rules.sense(sensing, _T0)
     assert robot.ask(0.5) == (0.0, reason)

@@ -39,7 +39,7 @@ _NS_PER_MS: Final = 1_000_000
 _SEND_S: Final = 2.0  # A client that does not read for this long is disconnected.
 _CLOSE_S: Final = 1.0
 _UNANSWERED_MS: Final = 4_000  # Data that stays unacknowledged for this long ends the connection.
-# A dead radio sends nothing: the connection ends 6 s after it fell silent.
+# A dead radio sends no data: the connection ends 6 s after it fell silent.
 _HEARTBEAT_S: Final = 4.0
 # A key of 128 bits cannot be guessed. The pause limits the cost of attempts for the robot, and does
 # not delay a client with the right key at the same address.
