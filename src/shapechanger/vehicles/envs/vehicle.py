@@ -267,7 +267,7 @@ class WaypointEnv(WaypointView, DriveEnv):
             for a boat, so that only the bodies of vehicles differ.
         sensed: Whether the robot is simulated as in `VehicleEnv`, its sensors measure speed and
             reward, and `info` has all keys of `VehicleEnv`; otherwise speed and reward are the true
-            ones, as in `RangesEnv`.
+            ones; see `RangesEnv`.
         **task: `reward`, `courses`, `randomise`, `put_back`, `lenses` and `render_mode` of
             `VehicleEnv`. Warping ignores errors of the camera's pose, so with `randomise` images
             show them.
