@@ -6,33 +6,10 @@ import numpy as np
 
 from shapechanger.contract.env_ref import Measure
 from shapechanger.envs.own_tasks import RobotState
+from tests.models import xml
 
 # A dog with a front and a back leg, each on a hinge; the front one has a motor, the other a servo.
-DOG = """
-<mujoco model="dog">
-  <option timestep="0.005"/>
-  <worldbody>
-    <geom name="floor" type="plane" size="20 20 1"/>
-    <body name="trunk" pos="0 0 .5">
-      <freejoint/>
-      <geom name="trunk" type="box" size=".3 .15 .05" mass="3"/>
-      <body name="front" pos=".25 0 0">
-        <joint name="front" axis="0 1 0" range="-60 60" damping="1"/>
-        <geom name="front" type="capsule" fromto="0 0 0 .1 0 -.4" size=".04"/>
-      </body>
-      <body name="back" pos="-.25 0 0">
-        <joint name="back" axis="0 1 0" range="-60 60" damping="1"/>
-        <geom name="back" type="capsule" fromto="0 0 0 -.1 0 -.4" size=".04"/>
-      </body>
-    </body>
-  </worldbody>
-  <actuator>
-    <motor name="front" joint="front" gear="30" ctrlrange="-2 1"/>
-    <position name="back" joint="back" kp="40" ctrlrange="-1 1"/>
-  </actuator>
-  <keyframe><key name="home" qpos="0 0 .47 1 0 0 0 .2 -.2" ctrl="0 -.2"/></keyframe>
-</mujoco>
-"""
+DOG = xml("dog")
 
 
 class Rear:

@@ -16,6 +16,7 @@ from shapechanger.errors import TaskError
 from shapechanger.morphology import AddMotor
 from shapechanger.morphology.pose import floor_height
 from tests.envs.own_robots import DOG
+from tests.models import xml
 
 _BALL = '<body name="ball" pos="3 0 .1"><freejoint/><geom size=".1" mass=".1"/></body>'
 _DOOR = (
@@ -23,25 +24,7 @@ _DOOR = (
     '<geom type="box" size=".5 .02 1"/></body>'
 )
 _FLOOR = '<geom name="floor" type="plane" size="20 20 1"/>'
-_ARM = """
-<mujoco>
-  <worldbody>
-    {scene}
-    <body name="stand"><geom size=".05"/>
-      <body name="arm" pos="0 0 .5"><joint name="arm" axis="0 1 0" range="-60 60"/>
-        <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
-        <body name="left" pos=".3 0 0">
-          <joint name="left" type="slide" axis="0 1 0" range="0 .04"/>
-          <geom size=".01" mass=".05"/></body>
-        <body name="right" pos=".3 0 0">
-          <joint name="right" type="slide" axis="0 -1 0" range="0 .04"/>
-          <geom size=".01" mass=".05"/></body>
-      </body></body>
-  </worldbody>
-  <equality><joint joint1="right" joint2="left"/></equality>
-  {actuators}
-</mujoco>
-"""
+_ARM = xml("arm_own")
 _MOTORS = (
     '<actuator><motor joint="arm" ctrlrange="-30 30"/>'
     '<position joint="left" kp="10" ctrlrange="0 .04"/></actuator>'

@@ -12,116 +12,22 @@ from numpy.typing import NDArray
 from shapechanger.envs.ant import ANT
 from shapechanger.envs.pendulum import PENDULUM
 from shapechanger.morphology import Edit, compile_body
+from tests.models import xml
 from tests.morphology.scenes import ASSETS
 
 Array = NDArray[np.float64]
 
 # A leg of two segments on a free trunk above a floor, in degrees like most models.
-LEG = """
-<mujoco model="leg">
-  <default><geom density="500"/><joint armature=".1"/></default>
-  <worldbody>
-    <geom name="floor" type="plane" size="5 5 1"/>
-    <body name="trunk" pos="0 0 1">
-      <freejoint name="root"/>
-      <geom name="trunk" type="box" size=".2 .1 .05"/>
-      <body name="thigh" pos="0 .2 0">
-        <joint name="hip" axis="1 0 0" range="-60 30" damping="2" stiffness="3" frictionloss=".5"/>
-        <geom name="thigh" type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>
-        <site name="scar" pos="0 0 -.06"/>
-        <site name="knee_cap" pos="0 .03 -.3"/>
-        <body name="shin" pos="0 0 -.25">
-          <joint name="knee" pos="0 0 -.05" axis="1 0 0" range="-90 0" damping="1"/>
-          <geom name="shin" type="capsule" fromto="0 0 -.05 0 0 -.25" size=".02"/>
-          <geom name="sole" size=".04" pos="0 0 -.25"/>
-          <site name="toe" pos="0 0 -.29"/>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-  <actuator>
-    <motor name="hip" joint="hip" gear="20" ctrlrange="-1 1" ctrllimited="true"/>
-    <motor name="knee" joint="knee" gear="10" ctrlrange="-1 1" ctrllimited="true"/>
-  </actuator>
-</mujoco>
-"""
+LEG = xml("leg")
 
 # A body with several joints away from its origin, in radians.
-GANTRY = """
-<mujoco model="gantry">
-  <compiler angle="radian"/>
-  <worldbody>
-    <body name="rig" pos=".1 -.2 .3" euler=".3 -.2 .5">
-      <joint name="x" type="slide" axis="1 .2 0" pos="0 0 -3" range="-1 2" ref=".4"/>
-      <joint name="yaw" axis="0 .1 1" pos=".3 .1 0" range="-1 .5" ref=".2"/>
-      <joint name="y" type="slide" axis="0 1 .5"/>
-      <joint name="pitch" axis="0 -2 1" pos="0 .2 .1"/>
-      <geom name="rig" type="box" size=".1 .2 .3" pos="0 .1 .2"/>
-      <body name="boom" pos=".4 .1 0" axisangle="1 1 0 .7">
-        <joint name="swing" axis="1 0 1" pos="-.1 0 .2" range="-2 2"/>
-        <geom name="boom" type="capsule" size=".05 .3" euler=".2 .3 .4" pos=".1 .2 .3"/>
-        <site name="hook" pos=".1 .2 .6"/>
-      </body>
-    </body>
-  </worldbody>
-  <actuator><position name="yaw" joint="yaw" kp="3"/></actuator>
-  <sensor>
-    <jointpos name="yaw_angle" joint="yaw"/>
-    <actuatorfrc name="yaw_torque" actuator="yaw"/>
-    <jointpos name="swing_angle" joint="swing"/>
-    <framepos name="hook" objtype="site" objname="hook"/>
-  </sensor>
-  <equality><joint joint1="yaw" joint2="pitch"/><joint joint1="y" joint2="swing"/></equality>
-  <keyframe><key name="home" qpos=".4 .2 0 0 .1"/></keyframe>
-</mujoco>
-"""
+GANTRY = xml("gantry")
 
 # An arm of two joints on a base, as URDF. The second joint has no effort limit.
-URDF = """
-<robot name="arm">
-  <link name="base"><inertial><mass value="2"/>
-    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><geometry><box size=".2 .2 .2"/></geometry></collision></link>
-  <link name="upper"><inertial><mass value="1"/>
-    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="lower"><inertial><mass value="1"/>
-    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
-    <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="7" velocity="1"/></joint>
-  <joint name="elbow" type="continuous"><parent link="upper"/><child link="lower"/>
-    <origin xyz="0 0 .3"/><axis xyz="0 1 0"/></joint>
-</robot>
-"""
+URDF = xml("urdf")
 
 # An arm of two segments, with places for more elements.
-ARM = """
-<mujoco>
-  <compiler angle="radian"/>
-  {top}
-  <worldbody>
-    <site name="wall" pos="0 0 1"/>
-    <body name="trunk" pos="0 0 1">{root}<geom name="trunk" size=".1"/>
-      <site name="shoulder" pos=".1 0 0"/><geom name="ball" size=".02" pos=".1 .1 0"/>
-      {trunk}
-      <body name="upper" pos=".1 0 0"><joint name="upper" axis="0 1 0" range="-1 1" {joint}/>
-        <geom name="upper" type="capsule" fromto="0 0 0 .4 0 0" size=".02"/>
-        <site name="middle" pos=".2 0 0"/>
-        {upper}
-        <body name="lower" pos=".4 0 0"><joint name="lower" axis="0 1 0" range="-1 1"/>
-          <geom name="lower" type="capsule" fromto="0 0 0 .4 0 0" size=".02"/>
-          <site name="hand" pos=".3 0 0"/>
-          {lower}
-        </body>
-      </body>
-      <body name="other" pos="0 .3 0"><joint name="other" axis="0 1 0" range="-1 1"/>
-        <geom name="other" type="capsule" fromto="0 0 0 .4 0 0" size=".02"/>
-        <site name="other" pos=".4 0 0"/>
-      </body>
-    </body>
-  </worldbody>
-  {rest}
-</mujoco>
-"""
+ARM = xml("arm")
 ROPE = '<site site="shoulder"/><site site="hand"/>'
 
 

@@ -19,6 +19,7 @@ from shapechanger.morphology.pose import (
     trunk_lift,
 )
 from shapechanger.morphology.pose import posed as pose_of
+from tests.models import xml
 from tests.morphology.models import ant, built, posed, spec_of
 
 _BALL = """
@@ -101,19 +102,7 @@ def test_no_foot_starts_in_the_floor(body: str, factor: float) -> None:
     assert pose[2] >= model.qpos0[2]
 
 
-_HOPPER = """
-<mujoco>
-  <worldbody>
-    <geom type="plane" size="1 1 1"/>
-    <body name="torso" pos="0 0 {height}" euler="{turn}">
-      <joint type="slide" axis="1 0 0"/>
-      <joint type="slide" axis="{axis}" ref="{ref}" {limits}/>
-      <geom size=".2"/>
-      <body pos="0 0 -.5"><joint name="leg" range="-150 -30" ref="-20"/><geom size=".1"/></body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
+_HOPPER = xml("hopper")
 
 
 def _hopper(height: float = 1.0, axis: str = "0 0 1", **parts: object) -> mujoco.MjModel:
@@ -182,41 +171,8 @@ def test_a_standing_pose_touches_the_floor() -> None:
 
 
 # A leg whose foot is driven by a rod, on a free trunk, like Cassie's.
-_FOUR_BAR = """
-<mujoco>
-  <compiler angle="radian"/>
-  <option jacobian="{jacobian}"/>
-  <worldbody>
-    <geom type="plane" size="9 9 1"/>
-    <body name="trunk" pos="0 0 1"><freejoint/><geom size=".05" mass="3"/>
-      <body name="crank"><joint name="crank" axis="0 1 0" range="-1 1"/>
-        <geom type="capsule" fromto="0 0 0 .1 0 0" size=".01"/>
-        <body name="rod" pos=".1 0 0"><joint name="rod" axis="0 1 0"/>
-          <geom type="capsule" fromto="0 0 0 0 0 -.3" size=".01"/></body></body>
-      <body name="shank" pos="0 0 -.3"><joint name="shank" axis="0 1 0" range="-1 1"/>
-        <geom type="capsule" fromto="0 0 0 .1 0 0" size=".01"/></body>
-    </body>
-  </worldbody>
-  <equality><connect body1="rod" body2="shank" anchor="0 0 -.3"/></equality>
-  <actuator><motor joint="crank" ctrlrange="-1 1"/></actuator>
-</mujoco>
-"""
-_COUPLED = """
-<mujoco>
-  <compiler angle="radian"/>
-  <worldbody>
-    <body><joint name="lead" axis="0 1 0" range="-1 1"/><geom size=".1"/></body>
-    <body pos="1 0 0"><joint name="follow" axis="0 1 0" range="{low} {high}"/>
-      <geom size=".1"/></body>
-    <body pos="2 0 0"><joint name="last" type="slide" range="-2 2"/><geom size=".1"/></body>
-  </worldbody>
-  <equality>
-    <joint joint1="follow" joint2="lead" polycoef="{coefficients}"/>
-    <joint joint1="last" joint2="follow" polycoef="0 -.5 0 0 0"/>
-  </equality>
-  <actuator><motor joint="lead" ctrlrange="-1 1"/></actuator>
-</mujoco>
-"""
+_FOUR_BAR = xml("four_bar")
+_COUPLED = xml("coupled")
 
 
 def _gap(model: mujoco.MjModel, pose: np.ndarray) -> float:

@@ -20,27 +20,10 @@ from shapechanger.morphology.pose import (
     trunk_lift,
 )
 from shapechanger.morphology.tree import LIMB_NUMBERS, TRUNK_NUMBERS, Tree, tree_of
+from tests.models import xml
 from tests.morphology.models import ant, built
 
-_ARM = """
-<mujoco>
-  <worldbody>
-    <geom name="floor" type="plane" size="1 1 1" friction="0.8"/>
-    <geom name="base" type="box" size="0.1 0.1 0.1"/>
-    <body name="slider" pos="0 0 1">
-      <joint name="along" type="slide" axis="1 0 0" range="-1 1" limited="true"/>
-      <joint name="around" axis="0 0 1"/>
-      <geom type="sphere" size="0.1" mass="2"/>
-      <body name="tip" pos="0.5 0 0"><geom type="capsule" size="0.05 0.2" mass="1"/></body>
-      <body name="thin" pos="0 0.2 0">
-        <joint name="ball" type="ball"/>
-        <geom type="sphere" size="0.1" mass="0.0001"/>
-      </body>
-    </body>
-  </worldbody>
-  <actuator><motor name="pull" joint="along" gear="9"/></actuator>
-</mujoco>
-"""
+_ARM = xml("arm_tree")
 
 
 def _ant(body: Body) -> Tree:
@@ -119,30 +102,7 @@ def test_a_body_on_the_world() -> None:
     assert tree.numbers[TRUNK_NUMBERS.index("friction")] == 1.0  # Without a floor.
 
 
-_TENDONS = """
-<mujoco>
-  <worldbody>
-    <site name="wall" pos="0.1 0 0.15"/><site name="floor"/>
-    <body name="upper"><joint name="shoulder" axis="0 1 0"/>
-      <geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/>
-      <site name="upper" pos=".03 0 .25"/>
-      <body name="lower" pos="0 0 .3"><joint name="elbow" axis="0 1 0"/>
-        <geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/>
-        <site name="lower" pos=".03 0 .1"/>
-        <body name="hand" pos="0 0 .3"><joint name="wrist" axis="0 1 0"/><geom size=".02"/></body>
-      </body>
-    </body>
-  </worldbody>
-  <tendon>
-    <fixed name="flex_elbow"><joint joint="elbow" coef="1"/></fixed>
-    <fixed name="both"><joint joint="shoulder" coef="-.5"/><joint joint="elbow" coef=".5"/></fixed>
-    <fixed name="wrist_most"><joint joint="elbow" coef="1"/><joint joint="wrist" coef="2"/></fixed>
-    <spatial name="biceps"><site site="upper"/><site site="lower"/></spatial>
-    <spatial name="slack"><site site="wall"/><site site="floor"/></spatial>
-  </tendon>
-  <actuator>{}</actuator>
-</mujoco>
-"""
+_TENDONS = xml("tendons")
 
 
 @pytest.mark.parametrize(
@@ -189,27 +149,7 @@ def test_the_strength_of_a_tendon_is_a_torque(actuators: str, torque: float) -> 
 
 
 # Objects come first, so that code that relies on the order of the file fails.
-_SCENE = """
-<mujoco>
-  <worldbody>
-    <geom name="floor" type="plane" size="9 9 1"/>
-    <body name="ball" pos="3 0 .1"><freejoint name="ball"/><geom size=".1" mass="5"/></body>
-    <body name="door" pos="5 0 1">
-      <joint name="door" axis="0 0 1" range="0 90" damping="1"/>
-      <geom type="box" size=".5 .02 1" mass="20"/><site name="knob"/>
-    </body>
-    <body name="table"><geom type="box" size=".5 .5 .01" pos="-3 0 .5" mass="9"/></body>
-    <body name="base" pos="0 0 .5">
-      <geom size=".05" mass="2"/>
-      <body name="arm" pos="0 0 .1">
-        <joint name="arm" axis="0 1 0" range="-60 60"/><geom size=".03" pos="0 0 .2" mass="1"/>
-        <site name="tip" pos="0 0 .2"/><site name="crank" pos=".02 0 .2"/>
-      </body>
-    </body>
-  </worldbody>
-  {more}
-</mujoco>
-"""
+_SCENE = xml("scene_tree")
 _MOVED_BY_JOINT = '<actuator><motor joint="arm" ctrlrange="-1 1"/></actuator>'
 _ROBOT = ["base", "arm"]
 # A flex, whose equality couples no bodies.
@@ -295,21 +235,7 @@ def test_the_trunk_is_the_tree_that_most_actuators_move() -> None:
     assert model.body(travelling_body(model)).name == "drone"
 
 
-_WALKER = """
-<mujoco>
-  <worldbody>
-    <geom type="plane" size="9 9 1"/>
-    <body name="low" pos="3 0 -.2"><freejoint/><geom size=".5" mass="7"/></body>
-    <body name="flap" pos="4 0 1"><joint name="flap" axis="0 0 1" range="0 1"/>
-      <geom size=".1"/></body>
-    <body name="trunk" pos="0 0 .4"><freejoint/><geom size=".1" mass="2"/>
-      <body name="leg"><joint name="leg" axis="0 1 0" range="0 1"/>
-        <geom type="capsule" fromto="0 0 0 0 0 -.4" size=".05" mass="1"/></body></body>
-  </worldbody>
-  <actuator><motor joint="leg" ctrlrange="-1 1"/></actuator>
-  <compiler angle="radian"/>
-</mujoco>
-"""
+_WALKER = xml("walker")
 
 
 def test_objects_neither_carry_the_robot_nor_move() -> None:

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from shapechanger.envs.ant import AntEnv
 from shapechanger.envs.stepping import tuned
 from shapechanger.envs.stepping.fast_model import find_fast_model, moves_equally
+from tests.models import xml
 
 pytestmark = pytest.mark.usefixtures("log_elsewhere")
 
@@ -25,31 +26,7 @@ _FRICTION = int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
 _BALL = '<geom name="{0}" size="0.1" {1}/>'
-_SCENE = """
-<mujoco>
-  <option timestep="0.005"/>
-  <worldbody>
-    <geom name="floor" type="plane" size="5 5 1" {floor}/>
-    {fixed}
-    <body name="trunk" pos="0 0 0.3">
-      <freejoint/>
-      <geom name="trunk" size="0.1" {trunk}/>
-      {more}
-      <body name="leg" pos="0.25 0 0">
-        <joint name="hip" axis="0 1 0" range="-40 40" limited="true"/>
-        <geom name="thigh" type="capsule" fromto="0 0 0 0.2 0 0" size="0.05" {legs}/>
-        <body name="shin" pos="0.25 0 0">
-          <joint name="knee" axis="0 1 0" range="-160 160" limited="true"/>
-          <geom name="shin" type="capsule" fromto="0 0 0 0.2 0 0" size="0.05" {legs}/>
-        </body>
-      </body>
-    </body>
-    {other}
-  </worldbody>
-  {rest}
-  <actuator><motor joint="hip" gear="5"/><motor joint="knee" gear="5"/></actuator>
-</mujoco>
-"""
+_SCENE = xml("scene_fast")
 _SILENT = 'conaffinity="0"'
 
 

@@ -26,6 +26,7 @@ from shapechanger.morphology.certificate.numbers import (
     names_of,
 )
 from shapechanger.morphology.spec import name_elements
+from tests.models import xml
 from tests.morphology.scenes import EVERYTHING, asset, asset_spec, everything
 
 _CLOTH = """
@@ -40,27 +41,7 @@ _CLOTH = """
 """
 
 # Springs that yield, a moving belt, a delayed motor, and other things that few models have.
-_RARE = """
-<mujoco>
-  <worldbody>
-    <geom name="belt" type="box" size="1 1 .1" surfacevel="1 0 0 0 0 0"/>
-    <site name="hook" pos="0 0 1"/>
-    <body pos="0 0 .15">
-      <joint name="hinge" axis="0 1 0" stiffness="1" springyield=".1"/>
-      <geom size=".1"/><site name="eye" pos="0 0 .2"/>
-    </body>
-    <body pos="9 0 1"><joint name="swivel" type="ball"/><geom size=".1"/></body>
-  </worldbody>
-  <tendon><spatial name="rope" stiffness="1" springyield=".1" actuatorfrcrange="-1 1">
-    <site site="eye"/><site site="hook"/></spatial></tendon>
-  <actuator>
-    <motor name="slow" joint="hinge" delay=".01" nsample="4" damping=".1" armature=".2"/>
-    <motor name="winch" tendon="rope"/>
-    <orientation joint="swivel"/>
-  </actuator>
-  <equality><joint joint1="hinge"/></equality>
-</mujoco>
-"""
+_RARE = xml("rare")
 
 
 @functools.cache

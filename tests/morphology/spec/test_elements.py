@@ -12,26 +12,11 @@ import pytest
 from shapechanger.errors import MorphologyError, UnknownName
 from shapechanger.morphology import AddLimb, Mass, name_elements
 from shapechanger.morphology.spec import copy_element, make_explicit, resolve_frames, select
+from tests.models import xml
 from tests.morphology.models import ant, arm, built, differing, mass, posed, spatial, spec_of
 from tests.morphology.scenes import asset_spec
 
-_NAMELESS = """
-<mujoco>
-  <worldbody>
-    <geom type="plane" size="1 1 1"/>
-    <body>
-      <freejoint/>
-      <geom size=".1"/><geom size=".1"/><geom name="body_part_geom" size=".1"/>
-      <site/><camera/>
-      <body pos="1 0 0"><joint name="knee"/><geom size=".1"/></body>
-      <body pos="2 0 0"><joint name="knee_3"/><joint axis="1 0 0"/><geom size=".1"/></body>
-      <body name="knee" pos="3 0 0"><geom size=".1"/></body>
-      <body pos="4 0 0"><geom size=".1"/></body>
-    </body>
-  </worldbody>
-  <actuator><motor joint="knee"/><motor joint="knee"/><motor name="m" joint="knee_3"/></actuator>
-</mujoco>
-"""
+_NAMELESS = xml("nameless")
 
 
 def test_a_name_is_preferred_to_a_pattern() -> None:
@@ -71,35 +56,7 @@ def test_all_elements_get_unique_names() -> None:
 
 
 # Every kind of element that a frame can contain, in nested frames, in degrees.
-_FRAMES = """
-<mujoco>
-  <worldbody>
-    <frame name="stand" pos="0 0 1" euler="0 0 90">
-      <body name="trunk" pos=".1 0 0" euler="0 30 0">
-        <freejoint name="root"/>
-        <geom name="trunk" type="box" size=".2 .1 .05"/>
-        <frame pos="0 .1 0" axisangle="1 1 0 40">
-          <geom name="ends" type="capsule" fromto="0 0 0 .1 0 0" size=".01"/>
-          <geom name="beam" type="box" fromto="0 0 0 .1 .2 .1" size=".02"/>
-          <geom name="pose" type="capsule" pos="0 .1 0" euler="10 20 30" size=".01 .1"/>
-          <site name="ends" type="capsule" fromto="0 0 0 .1 0 0" size=".01"/>
-          <site name="pose" pos=".1 .1 .1"/>
-          <camera name="eye" pos="1 0 0" xyaxes="0 1 0 0 0 1"/>
-          <light name="lamp" pos="0 0 1" dir="1 0 -1"/>
-          <frame pos=".3 0 0" quat="1 2 0 0">
-            <body name="limb" pos="0 .2 0" euler="10 0 0">
-              <geom name="limb" type="capsule" fromto="0 0 0 0 .3 0" size=".03"/>
-              <frame pos=".1 .02 0" euler="0 0 20"><joint name="hip" axis="1 0 0"/></frame>
-              <joint name="twist" axis="0 0 1"/>
-            </body>
-          </frame>
-        </frame>
-      </body>
-    </frame>
-    <light name="sun" pos="0 0 3"/>
-  </worldbody>
-</mujoco>
-"""
+_FRAMES = xml("frames")
 
 
 def test_frames_are_resolved() -> None:

@@ -27,6 +27,7 @@ from shapechanger.morphology import (
     Stiffness,
     Stretch,
 )
+from tests.models import xml
 from tests.morphology.models import ROPE, arm, built, check_at_rest, spatial, spec_of
 from tests.morphology.scenes import asset_spec
 
@@ -203,22 +204,7 @@ def test_coupled_joints_are_held_at_the_polynomial(locked: str, refs: float) -> 
         built(spec, Lock("other", refs + 0.1))
 
 
-_TIED = """
-<mujoco>
-  <worldbody>
-    <body name="a"><joint name="a"/><geom size=".1" pos=".2 0 0"/>
-      <body name="b" pos=".4 0 0"><joint name="b"/><geom size=".1" pos=".2 0 0"/>
-        <site name="s"/></body>
-    </body>
-    <site name="w"/>
-  </worldbody>
-  <tendon>
-    <fixed {tendon}><joint joint="a" coef="1"/><joint joint="b" coef="-1"/></fixed>
-    <spatial name="rope"><site site="s"/><site site="w"/></spatial>
-  </tendon>
-  {rest}
-</mujoco>
-"""
+_TIED = xml("tied")
 
 
 def test_a_tendon_without_effect_is_removed() -> None:
