@@ -24,7 +24,6 @@ class Cli:
         self._group = group
 
     def ended(self, code: int, *words: object) -> Printed:
-        """Return the output and the errors of a command that ends with an exit code."""
         self._capsys.readouterr()
         found: object = 0
         try:

@@ -23,8 +23,6 @@ REQUIREMENTS = (
 
 
 def findings(installed: dict[str, str], dev: Path = Path("/nowhere")) -> dict[str, Finding]:
-    """Return the findings for a machine with some packages, keyed by check."""
-
     def version_of(package: str) -> str:
         if package not in installed:
             raise PackageNotFoundError(package)

@@ -80,7 +80,6 @@ def environment(served: FakeHub, tmp_path_factory: pytest.TempPathFactory) -> di
 
 @pytest.fixture(scope="module")
 def run(environment: dict[str, str]) -> Iterator[Run]:
-    """Run the command; returns the exit code, the output and the errors."""
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAMS],
         stdin=subprocess.PIPE,

@@ -77,14 +77,12 @@ def test_a_module_of_the_current_folder_is_found(
 
 
 def test_names_of_shipped_learners_do_not_change_the_path(folder: Path, cli: Cli) -> None:
-    """A shipped learner's name must not allow imports from the current folder."""
     cli.refused("train", "Ant", "--learner", "ppo-run", "--steps", "10")
     assert str(folder) not in sys.path
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a project called `cliown`, and a suite of it with a finished study."""
     project = tmp_path_factory.mktemp("project")
     write_project(project, "cliown")
     with pytest.MonkeyPatch.context() as patch:

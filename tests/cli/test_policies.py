@@ -203,7 +203,6 @@ def test_a_policy_is_trained_in_drawn_bodies(policy: Path) -> None:
 
 @pytest.mark.slow
 def test_rsl_ppo_trains_a_limb_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """In many bodies, `rsl-ppo` trains a limb policy, which also acts in other bodies."""
     out = tmp_path / "ants.safetensors"
     of_two = ["train", "Ant", "--bodies", "2", "--learner", "rsl-ppo", "--steps", "48"]
     main([*of_two, "--out", str(out), "--set", *_TINY, 'device="cpu"'])

@@ -49,7 +49,6 @@ class _Counting(Serial):
 
 @pytest.fixture(scope="module", autouse=True)
 def lanes() -> Iterator[None]:
-    """Three lane envs instead of four vehicles, and fast clones."""
     with pytest.MonkeyPatch.context() as patch:
         suite = SuiteFile(name="Lanes", envs=(DRY.id, WET.id, ICY.id), learner="cloning")
         patch.setattr(suite_command, "load_suite", lambda name: suite)
@@ -125,8 +124,6 @@ def test_a_stopped_suite_resumes_to_the_same_numbers(
 
 
 class _Failing(_Counting):
-    """Executor with a failing run in every study."""
-
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         self.done.append(jobs[0].name)
         raise FailedRuns("These runs failed: source-0 (broken).")

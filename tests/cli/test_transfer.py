@@ -44,13 +44,11 @@ def curves(out: Path) -> dict[str, list[tuple[int, float]]]:
 def quick(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """Folder and finished process of an uninterrupted quick study."""
     out = tmp_path_factory.mktemp("quick") / "study"
     return out, run(*QUICK, "--out", str(out))
 
 
 def test_a_study_is_one_command(quick: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
-    """The command writes study.json and a self-contained report, and a line for each run."""
     out, done = quick
     assert done.returncode == 0, done.stderr
     assert "Jumpstart" in done.stdout
@@ -103,7 +101,6 @@ def test_a_killed_study_resumes_to_the_same_numbers(
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A pendulum policy with its logs, and the output of its training."""
     policy = tmp_path_factory.mktemp("trained") / "policy.safetensors"
     logs = policy.with_name("logs")
     files = ["--out", str(policy), "--tensorboard", str(logs)]

@@ -27,7 +27,6 @@ def can_hold(angles: np.ndarray) -> bool:
 def made(
     parameters: FingerParameters = NOMINAL, mode: str = "tension", *, anatomy: bool = False
 ) -> mujoco.MjModel:
-    """Return the compiled finger."""
     return build_finger(parameters, drive_of(mode, NOMINAL), anatomy=anatomy).compile()
 
 

@@ -54,7 +54,6 @@ def test_a_tension_follows_within_the_lag(step: float | None, lag_ms: int) -> No
 
 
 def test_a_delay_shifts_the_response() -> None:
-    """With a delay of 12 ms, the tensions follow 12 ms later."""
     rig = _RIG.replace(path={"slew_per_s": 20.0})
     assert FingerParameters.from_json(rig.to_json()) == rig
     prompt, late = (

@@ -89,7 +89,6 @@ def test_invalid_ranges_are_refused(changes: dict[str, Any], sentence: str) -> N
 
 
 def test_invalid_gaps_are_refused() -> None:
-    """Unknown names, incomplete mappings and other types raise an error."""
     for given in ("real-like", _REAL_LIKE, msgspec.to_builtins(_REAL_LIKE)):
         assert resolve_gap(given) == _REAL_LIKE
     with pytest.raises(UnknownName, match=r"'reallike'. Did you mean 'real-like'"):

@@ -32,7 +32,6 @@ def sway(t: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def drawn(count: int, gap: str = "wide") -> list[FingerParameters]:
-    """Return fingers of a gap with exact sensors."""
     rng = np.random.default_rng(7)
     fingers = [GAPS[gap].draw(rng) for _ in range(count)]
     return [finger.replace(joint_noise=0.0, tension_noise=0.0) for finger in fingers]
@@ -150,7 +149,6 @@ def pair(request: pytest.FixtureRequest) -> Iterator[tuple[WarpVectorEnv, list[A
 def test_a_step_from_the_same_state_has_the_same_results(
     pair: tuple[WarpVectorEnv, list[Any]],
 ) -> None:
-    """Observation, reward, its terms, and success equal the CPU env's."""
     worlds, alone = pair
     assert worlds.observation_layout == alone[0].observation_layout
     assert worlds.action_layout == alone[0].action_layout
@@ -173,7 +171,6 @@ def test_a_step_from_the_same_state_has_the_same_results(
 
 @pytest.mark.parametrize("kind", ["plain", "rigs", "circles", "open paths"])
 def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
-    """Many steps after the same start agree."""
     worlds, alone = many(kind)
     rng = np.random.default_rng(1)
     begun = start_alike(worlds, alone, 3)
@@ -192,7 +189,6 @@ def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
 
 
 def test_starts_and_targets_have_the_distribution_of_the_cpu() -> None:
-    """Quantiles and spreads of angles and targets agree."""
     worlds = fingers(8)
     found: list[Any] = []
     worlds.reset(seed=0)
@@ -250,7 +246,6 @@ def test_noisy_sensors() -> None:
     ids=["path", "late and noisy"],
 )
 def test_time_limits_restart_fingers_alone(parameters: Any) -> None:
-    """An episode of 100 steps ends, and its finger starts at rest with another target."""
     worlds = fingers(2, parameters=parameters)
     assert worlds.max_episode_steps == 100
     _, infos = worlds.reset(seed=0)

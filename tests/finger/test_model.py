@@ -46,7 +46,6 @@ def test_each_tendon_moves_its_joints(parameters: FingerParameters, tendon: str)
 @pytest.mark.parametrize("mode", DRIVES)
 @pytest.mark.parametrize("finger", ["nominal", "stretched", *GAPS])
 def test_extreme_commands_are_stable(finger: str, mode: str) -> None:
-    """Joints, velocities and tensions stay within the tolerated limits, without a warning."""
     parameters = {"nominal": NOMINAL, "stretched": STRETCHED}.get(finger)
     if parameters is None:
         parameters = GAPS[finger].draw(np.random.default_rng(3))
@@ -73,7 +72,6 @@ def test_extreme_commands_are_stable(finger: str, mode: str) -> None:
 
 
 def test_tendons_are_slack_within_the_backlash() -> None:
-    """Motors that move within the backlash exert no force."""
     parameters = STRETCHED.replace(backlash=2e-3)
     model = made(parameters)
     data = at_rest(model, parameters)

@@ -84,7 +84,6 @@ def test_a_closed_path_repeats_without_a_seam(
 @law
 @given(path=ending_paths, later=st.floats(0.01, 100.0))
 def test_an_open_path_is_constant_outside(path: FingertipPath, later: float) -> None:
-    """Before its start and after its end, an open path stays at the end points."""
     assert not path.closed
     for t, end in ((path.duration_s + later, path.duration_s), (-later, 0.0)):
         np.testing.assert_array_equal(path.at(t), path.at(end))
@@ -96,7 +95,6 @@ def test_an_open_path_is_constant_outside(path: FingertipPath, later: float) -> 
     times=st.lists(st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), max_size=4),
 )
 def test_times_are_batched(path: FingertipPath, times: Sequence[Sequence[float]]) -> None:
-    """Times of any shape give the same positions as single times."""
     t = np.reshape(np.array(times, dtype=np.float64), (-1, 3))
     answer = path.at(t)
     assert (answer.shape, answer.dtype) == ((*t.shape, 3), np.float64)
@@ -111,7 +109,6 @@ def test_times_are_batched(path: FingertipPath, times: Sequence[Sequence[float]]
 def test_a_shape_round_trips_through_csv(
     path: Any, digits: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """A shape that is written with 6 or 12 decimals and read again is within 0.01 mm."""
     times = np.linspace(0.0, path.duration_s, 1 + math.ceil(100.0 * path.duration_s))
     points = path.at(times)
     assert np.linalg.norm(path.position(times, 1), axis=1).max() <= FASTEST_MPS + 1e-9
@@ -162,10 +159,7 @@ def test_a_circle_is_round(normal: Point, length: float) -> None:
 
 
 def test_a_figure_eight_crosses_itself_once() -> None:
-    """The path passes its centre twice a period, and the loops turn in opposite directions.
-
-    A depth bends the path along the normal, and changes nothing else.
-    """
+    """Its loops turn in opposite directions; a depth bends it along the normal only."""
     path: Any = figure_eight(0.02)
     t = np.linspace(0.0, 2.0, 2001)
     points = path.at(t) - CENTRE
@@ -246,7 +240,6 @@ def test_a_point_is_three_finite_numbers(given: object) -> None:
     ],
 )
 def test_a_function_that_jumps_is_refused(function: Callable[[float], Point], when: float) -> None:
-    """The error states the time of the jump."""
     with pytest.raises(PathError, match=rf"^At {when:g} s .* must not be faster than 2 m/s"):
         from_callable(function)
     from_callable(lambda t: (1.9 * t, 0.01 * abs(math.sin(t)), 0.0))
@@ -257,8 +250,6 @@ GOOD = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0,0\n0.2,0.07,0.01,0\n0.3,0.08,0.01,0\n"
 
 @pytest.fixture
 def write(tmp_path: File) -> Callable[[str], File]:
-    """Return a function that writes a text to a CSV file."""
-
     def put(text: str) -> File:
         file = tmp_path / "path.csv"
         file.write_bytes(text.encode())
@@ -280,7 +271,6 @@ def write(tmp_path: File) -> Callable[[str], File]:
     ids=["CRLF", "empty lines", "BOM", "spaces", "order", "offset and quotes"],
 )
 def test_formats_of_csv(write: Callable[[str], File], text: str) -> None:
-    """Line ends, spaces, quotes, a BOM and the order of columns have no effect."""
     path = from_csv(str(write(text)))
     assert not path.closed
     assert path.duration_s == pytest.approx(0.3)

@@ -44,7 +44,6 @@ def test_success_needs_ten_steps_at_the_target() -> None:
 
 
 def test_observations_match_their_names() -> None:
-    """Without noise, observations equal the simulator's state."""
     env = FingerReachEnv()
     env.reset(seed=1)
     rng = np.random.default_rng(0)
@@ -119,7 +118,6 @@ def test_invalid_actions_are_refused(action: Any, sentence: str) -> None:
 
 
 def test_options_set_start_and_target() -> None:
-    """The target is a point or angles; omitted options are drawn."""
     env = FingerReachEnv()
     _, info = env.reset(seed=0, options={"posture": [0.5, 0.1, 0.6, 0.3]})
     np.testing.assert_array_equal(env.plant.angles, [0.5, 0.1, 0.6, 0.3])
@@ -192,7 +190,6 @@ _ARRIVES = 60
 
 @pytest.mark.parametrize("actions", DRIVES)
 def test_the_controller_reaches_every_target(actions: str) -> None:
-    """All 20 targets are reached in each mode, with a median distance below 0.1 mm."""
     env = FingerReachEnv(actions=actions)
     controller = FingerController(env.observation_layout, actions)
     distances: list[float] = []
@@ -208,7 +205,6 @@ def test_the_controller_reaches_every_target(actions: str) -> None:
 
 @pytest.mark.parametrize("actions", DRIVES)
 def test_the_controller_follows_a_circle(actions: str) -> None:
-    """A circle of 12 mm at 1 Hz is followed within 3 mm RMS."""
     env = FingerTrackEnv(actions=actions, path={"kind": "circle", "radius": 0.012, "hz": 1.0})
     controller = FingerController(env.observation_layout, actions)
     seen, info = env.reset(seed=0)

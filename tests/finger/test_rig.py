@@ -54,7 +54,6 @@ def _measured(angles: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray
 
 
 def test_angles_follow_from_lengths_and_stretch() -> None:
-    """Angles are exact for nominal arms."""
     tensions = np.linspace(2.0, 20.0, 7)
     seen = _senses().read(_state(JOINT_REST, tensions), (), np.zeros(7))
     np.testing.assert_allclose(seen.angles, JOINT_REST, atol=1e-12)
@@ -79,7 +78,6 @@ def test_commands_are_shares_in_the_order_of_the_rig(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["car", "finger-pwm"])
 def test_other_robots_are_refused(name: str) -> None:
-    """Robots without tendons, or without their measurement, are refused."""
     with pytest.raises(RobotRefused, match="it is not a finger"):
         _senses_of(load_profile(find_profile(name)))
 

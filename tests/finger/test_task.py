@@ -18,7 +18,6 @@ _ANGLES = st.tuples(*[st.floats(-2.0, 2.0)] * 4)
 
 
 def test_fingertip_matches_the_simulator() -> None:
-    """The position equals the site's in MuJoCo; angles of any shape are batched."""
     model = made()
     data = mujoco.MjData(model)
     angles = np.random.default_rng(0).uniform(*JOINT_RANGE.T, (200, 4))
@@ -33,7 +32,6 @@ def test_fingertip_matches_the_simulator() -> None:
 
 @given(angles=_ANGLES)
 def test_jacobian_matches_finite_differences(angles: tuple[float, ...]) -> None:
-    """The Jacobian equals central differences at any angles, alone and in a batch."""
     step = 1e-6
     moved = np.array(angles) + step * np.concatenate([np.eye(4), -np.eye(4)])
     there, back = task.fingertip(moved).reshape(2, 4, 3)

@@ -26,7 +26,6 @@ _MICRO = 1e-6
 
 
 def test_arms_that_do_not_span_are_detected() -> None:
-    """Arms span all torques if they have full rank and a co-contraction without a torque."""
     tensions = co_contraction(_ARMS)
     assert tensions is not None
     assert spans_all_torques(_ARMS)
@@ -93,7 +92,6 @@ def test_command_inverts_tension(mode: str) -> None:
 
 @pytest.mark.parametrize("mode", DRIVES)
 def test_the_model_pulls_as_the_drive(mode: str) -> None:
-    """For any command, posture and speed, MuJoCo's actuators have the tensions of the drive."""
     model, drive = made(mode=mode), drive_of(mode, NOMINAL)
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     for _ in range(20):

@@ -20,7 +20,6 @@ from tests.finger.commands import STRETCHED, at_rest, made
 @pytest.mark.parametrize("mode", DRIVES)
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
 def test_anatomy_does_not_change_the_simulation(parameters: FingerParameters, mode: str) -> None:
-    """States with and without anatomy are equal."""
     found = []
     for anatomy in (False, True):
         model = made(parameters, mode, anatomy=anatomy)
@@ -74,7 +73,6 @@ def test_routes_agree_with_the_moment_arms() -> None:
 
 
 def test_show_sets_the_figure() -> None:
-    """`show` sets posture, tendon widths and target."""
     figure = FingerFigure()
     pulled = np.linspace(0.0, 1.2, 7)
     figure.show(JOINT_REST, pulled, np.array([0.05, 0.01, -0.04]))
@@ -108,7 +106,6 @@ def motion(model: mujoco.MjModel) -> np.ndarray:
 
 @pytest.mark.parametrize("name", FINGERS)
 def test_the_mjcf_file_moves_like_the_simulated_finger(name: str) -> None:
-    """States over one second of the same commands are equal."""
     parameters = FINGERS[name]
     loaded = mujoco.MjModel.from_xml_string(finger_mjcf(parameters, DRIVE))
     own = motion(build_finger(parameters, DRIVE).compile())
@@ -117,7 +114,6 @@ def test_the_mjcf_file_moves_like_the_simulated_finger(name: str) -> None:
 
 
 def numbers(parameters: FingerParameters) -> dict[str, list[float]]:
-    """Return the numbers in the file, keyed by name."""
     model = mujoco.MjModel.from_xml_string(finger_mjcf(parameters, DRIVE))
     names = [model.numeric(i).name for i in range(model.nnumeric)]
     return {name: model.numeric(name).data.tolist() for name in names}
@@ -143,7 +139,6 @@ _SIZE = {"width": 160, "height": 120}
 
 @pytest.fixture
 def finger() -> Iterator[Any]:
-    """A finger env that renders frames."""
     with gym.make("shapechanger/Finger-v1", render_mode="rgb_array", **_SIZE) as env:
         env.reset(seed=0, options={"posture": JOINT_REST.tolist()})
         yield env
@@ -157,7 +152,6 @@ def _differs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_frame_shows_posture_and_target_of_the_finger(finger: Any) -> None:
-    """Frames have the requested size, a light border, and a dark finger."""
     frame = finger.render()
     assert (frame.shape, frame.dtype) == ((120, 160, 3), np.uint8)
     border = np.concatenate([frame[0], frame[-1], frame[:, 0], frame[:, -1]])
@@ -177,7 +171,6 @@ def test_a_frame_shows_posture_and_target_of_the_finger(finger: Any) -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_rendering_does_not_change_the_episode() -> None:
-    """Observations with and without rendering are equal."""
     found = []
     for mode in (None, "rgb_array"):
         with gym.make("shapechanger/Finger-v1", render_mode=mode, **_SIZE) as env:

@@ -151,7 +151,6 @@ def test_one_episode_must_be_named(data: Path, demos: Cli) -> None:
 
 
 def test_replay_needs_one_target(data: Path, demos: Cli) -> None:
-    """`replay` needs exactly one of --film, --env and --robot, and an episode with kept steps."""
     first, _ = episodes(data)
     assert "one of --film, --env and --robot" in demos.refused("replay", first)
     demos.output("edit", "bad", first)

@@ -36,7 +36,6 @@ Jail = Callable[..., tuple[int, str]]
 
 @pytest.fixture(scope="module")
 def jail() -> Iterator[Jail]:
-    """Run `shapechanger demos` with limits; returns the exit code and the output."""
     environment = os.environ | {"COLUMNS": "400"}
     command = [sys.executable, "-m", "tests.cli.demos.jail"]
     with subprocess.Popen(

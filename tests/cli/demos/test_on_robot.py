@@ -21,7 +21,6 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 @pytest.fixture
 def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningRobot]:
-    """A car in a room, which is a known robot called `car`."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot:
         known = robot.known

@@ -40,7 +40,6 @@ def test_the_default_place(name: str, place: Place) -> None:
 
 
 def test_the_finger_of_a_gap_is_the_finger_of_the_env() -> None:
-    """`Finger-v1` draws the same finger for the seed."""
     drawn = place_of(_shipped("finger"), "", (), "real-like", 3)
     assert drawn == finger_place(GAPS["real-like"].draw(np.random.default_rng(3)))
     with pytest.raises(RobotError, match="lab-car has no servos for the tendons FDP"):

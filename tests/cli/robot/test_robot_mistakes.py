@@ -36,10 +36,7 @@ def robot(capsys: pytest.CaptureFixture[str]) -> Cli:
 
 @pytest.fixture(autouse=True)
 def home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A working folder with empty configuration and temporary folders.
-
-    The path of the folder is short, because paths of sockets must be short.
-    """
+    """A working folder and empty folders of the user; its path is short, as for sockets."""
     tmp_path = Path(tempfile.mkdtemp())
     for name, variable in (("config", "XDG_CONFIG_HOME"), ("tmp", "TMPDIR")):
         (tmp_path / name).mkdir()

@@ -44,7 +44,6 @@ def kinematics(
 
 
 def changed(log: FingerLog, **changes: Any) -> FingerLog:
-    """Return the log with some fields replaced."""
     return dataclasses.replace(log, **changes)
 
 

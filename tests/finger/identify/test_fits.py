@@ -44,7 +44,6 @@ def short() -> tuple[FingerLog, FingerParameters]:
 
 
 def exact() -> Kinematics:
-    """Return kinematics without noise."""
     return kinematics(angles=short()[0].angles)
 
 
@@ -138,7 +137,6 @@ def test_strength_needs_saturation() -> None:
 
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
 def test_lag_and_delay_are_found(actions: str) -> None:
-    """Lag, delay and the strength of saturated motors are found in every action mode."""
     most = tuple(0.9 * tension for tension in NOMINAL.most_tension)
     parameters = NOMINAL.replace(
         motor_lag=0.030, command_delay=0.024, most_tension=most, tension_noise=0.2

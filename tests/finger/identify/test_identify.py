@@ -36,7 +36,6 @@ def quick() -> tuple[FingerLog, FingerParameters, IdentifiedFinger, tuple[str, .
 
 
 def test_a_finger_is_identified() -> None:
-    """The true parameters of a finger without noise are found, and its motion is predicted."""
     log, truth, found, steps = quick()
     np.testing.assert_allclose(found.parameters.arms, truth.arms, rtol=0.01)
     assert found.parameters.tendon_stiffness is None

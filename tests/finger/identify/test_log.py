@@ -22,7 +22,6 @@ from tests.finger.identify.logs import changed, made_up, recorded
 
 
 def test_a_log_round_trips(tmp_path: Path) -> None:
-    """All signals and settings are kept."""
     log = changed(made_up(), source="finger of the third shelf", actions="tension")
     save_log(log, tmp_path / "log")
     back = load_log(tmp_path / "log")
@@ -103,7 +102,6 @@ DAMAGED = r"is damaged, or not a finger log: .*\. Record one with `shapechanger 
 
 
 def test_files_that_are_no_logs_are_refused(tmp_path: Path) -> None:
-    """Missing, foreign, truncated and huge files, folders, pipes and devices."""
     path, pipe = tmp_path / "log.npz", tmp_path / "pipe.npz"
     for one in (path, tmp_path):
         with pytest.raises(FingerError, match=r"cannot be read: (No such file|Is a directory)"):
@@ -161,7 +159,6 @@ def rewritten(path: Path, header: dict[str, Any], arrays: dict[str, Any]) -> Non
 def test_other_archives_are_refused(
     tmp_path: Path, header: dict[str, Any], arrays: dict[str, Any], sentence: str
 ) -> None:
-    """Other formats, later versions, other fingers, and missing or invalid arrays."""
     path = tmp_path / "log.npz"
     rewritten(path, header, arrays)
     with pytest.raises(FingerError, match=sentence):
@@ -212,6 +209,5 @@ def test_the_seed_determines_the_motion() -> None:
 def test_envs_that_give_no_log_are_refused(
     env: tuple[str, dict[str, Any]], error: type[Exception], text: str
 ) -> None:
-    """Goals, an env without layouts, and an env that ends too early are refused."""
     with gym.make(env[0], **env[1]) as made, pytest.raises(error, match=text):
         record_babble(made, 3.0)

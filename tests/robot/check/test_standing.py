@@ -55,7 +55,6 @@ def _found(robot: StandingRobot) -> Found:
 
 
 def _on(root: Path, profile: Profile, **more: Any) -> dict[str, Finding]:
-    """Return the last finding of each check on a computer with some files."""
     robot = StandingRobot(profile, root=root, **more)
     return {finding.check: finding for finding in examine(robot)}
 

@@ -35,7 +35,6 @@ STATE = (
 
 
 def observation(**fields: Any) -> m.Observation:
-    """Return an observation; all fields that are not given are empty."""
     empty: dict[str, Any] = {
         name: 0 for name in m.Observation.__struct_fields__ if name.endswith(("seq", "_ns"))
     }

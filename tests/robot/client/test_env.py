@@ -42,7 +42,6 @@ REST = np.zeros(2, np.float32)
 
 @pytest.fixture
 def made() -> Iterator[Made]:
-    """Make the env of a robot, in lockstep; it is closed after the test."""
     with contextlib.ExitStack() as stack:
 
         def make(robot: Robot, **how: Any) -> Any:

@@ -57,7 +57,6 @@ class Served:
         return KnownRobot("test", f"127.0.0.1:{self.running.port}", self.key, self.known_at)
 
     def sense(self, **quantities: float) -> None:
-        """Make the guard report sensor values."""
         sensed = SENSED | quantities
         state = {"quantities": sensed, "sources": dict.fromkeys(sensed, "wheel")}
         self._loop.call_soon_threadsafe(lambda: self.running.guard.send(**state))

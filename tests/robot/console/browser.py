@@ -77,15 +77,11 @@ class Console:
         self.sent.append(msgspec.msgpack.decode(message))
 
     def await_state(self, seconds: float = 60.0, /, **state: str) -> None:
-        """Wait until the page is in a state, such as `robot="armed"`."""
         wanted = "".join(f"[data-{name}='{value}']" for name, value in state.items())
         self.page.locator(f"body{wanted}").wait_for(timeout=1000 * seconds)
 
     def arm(self) -> None:
-        """Take control, and arm the robot.
-
-        On a busy machine the robot's answer may come too late, and E must be pressed again.
-        """
+        """Take control and arm; a busy robot may answer too late, so E is pressed again."""
         self.await_state(link="open", view="drive")
         self.page.locator("body[data-robot='disarmed'], body[data-robot='emergency']").wait_for()
         for _ in range(_PRESSES):
@@ -96,11 +92,7 @@ class Console:
         raise AssertionError("The robot was not armed, though E was pressed.")
 
     def drive(self, key: str, pins: Pins, way: float = 0.0) -> None:
-        """Hold a key until the robot moves, in the direction of the sign of `way` or in any.
-
-        On a busy machine the page may receive nothing for so long that the key must be pressed
-        again.
-        """
+        """Hold a key until `pins` move; a busy page may miss it, so it is pressed again."""
         pins.forget()
         for _ in range(_PRESSES):
             self.page.keyboard.down(key)
@@ -164,14 +156,10 @@ class Pins:
         self._pushes = [self.propels()]
 
     def await_motion(self, way: float = 0.0) -> None:
-        """Wait until the robot moves, in the direction of the sign of `way` or in any."""
         until(lambda: self.moves(way), 60.0)
 
     def moves(self, way: float = 0.0) -> bool:
-        """Return True if the car has been driven in the direction of the sign of `way`, or in any.
-
-        Motion since the last `forget` counts: on a busy machine, the car may be at a wall already.
-        """
+        """Return True if the car has moved in the direction of `way`, or any, since `forget`."""
         self.propels()
         return any(push * (way or push) > 0.0 for push in self._pushes)
 

@@ -15,20 +15,14 @@ from tests.robots import CAR, IN_A_ROOM, write_profile
 
 @pytest.fixture(scope="module")
 def served_car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
-    """A car with a camera on its twin, for all tests of a module.
-
-    Its time advances with the page's observations, so that a busy machine has no effect.
-    """
+    """A car with a camera, for a module; its time advances with the page's observations."""
     with _served(tmp_path_factory.mktemp("car"), "twin") as robot:
         yield robot
 
 
 @pytest.fixture
 def car(served_car: RunningRobot) -> RunningRobot:
-    """The car of `served_car`, put at its start because it could not drive at a wall.
-
-    Each test must leave the car disarmed or stopped.
-    """
+    """The car of `served_car`, put at its start. Each test must leave it disarmed or stopped."""
     with served_car.operator() as operator:
         operator.place(0)
     return served_car
@@ -36,7 +30,6 @@ def car(served_car: RunningRobot) -> RunningRobot:
 
 @pytest.fixture
 def hasty_car(tmp_path: Path) -> Iterator[RunningRobot]:
-    """A car with a camera on its twin, in real time."""
     with _served(tmp_path, "real") as robot:
         yield robot
 

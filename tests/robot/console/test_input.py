@@ -55,10 +55,7 @@ class Input:
         self._browser.send("Input.dispatchTouchEvent", event)
 
     def orders(self) -> list[Any]:
-        """Return the orders since the last call, after the page has answered twice more.
-
-        A command is given as the signs of steering and throttle; consecutive equal commands as one.
-        """
+        """Return orders since the last call; commands as signs of steering and throttle, once."""
         self._await_answers(2)
         sent, self.console.sent = self.console.sent, []
         orders: list[Any] = []

@@ -45,7 +45,6 @@ def test_a_second_person_cannot_take_control(car: RunningRobot, visit: Visit) ->
 def test_a_slow_page_stops_its_robot_and_delays_no_other_client(
     hasty_car: RunningRobot, visit: Visit
 ) -> None:
-    """While the page's main thread hangs, the robot stops and other clients are served."""
     console, pins = visit(hasty_car), Pins(hasty_car)
     console.arm()
     console.drive("w", pins)

@@ -20,10 +20,7 @@ from tests.robot.guard.plans import quick_car
 
 
 class FakeGuard:
-    """The guard's end of the socket, which applies orders by the rules, and replies with its state.
-
-    It has neither sensors nor outputs, and does not stop at the deadline of a command.
-    """
+    """The guard's end of the socket: it applies orders by the rules, without any deadline."""
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

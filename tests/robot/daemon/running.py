@@ -60,7 +60,6 @@ class Client:
         return received
 
     async def expect(self, kind: type[_M]) -> _M:
-        """Return the next message of a type, and skip others."""
         while (message := await self.receive()) is not None:
             if isinstance(message, kind):
                 return message
@@ -165,7 +164,6 @@ class Running:
 async def running(
     plan: DaemonPlan, monkeypatch: pytest.MonkeyPatch, clock: Clock | None = None
 ) -> AsyncIterator[Running]:
-    """Run a daemon with a fake guard and a fake camera."""
     clock = Clock() if clock is None else clock
     camera = FakeCamera()
     monkeypatch.setattr(daemon_camera, "open_camera", camera.open)

@@ -21,7 +21,6 @@ Ask = Callable[[Question], Answer]
 
 @pytest.fixture
 def ask(tmp_path: Path) -> Iterator[Ask]:
-    """Ask about the recordings of a folder, and wait for the answer."""
     library = RecordingLibrary(tmp_path, lambda work: work())
 
     def asked(question: Question) -> Answer:

@@ -15,7 +15,6 @@ HEADER = EpisodeHeader(action_layout=ACTIONS)
 
 
 async def recording(client: Client, on: bool = True) -> link.RecorderState:
-    """Start or stop recording, and wait for the confirmation."""
     await client.send(link.Record(on=on, name="corridor"))
     while True:
         state = await client.expect(link.RecorderState)

@@ -118,10 +118,7 @@ class Robot(stateful.RuleBasedStateMachine):
         client=clients, by_holder=st.booleans(), emergency=st.integers(0, 2), back=_backs
     )
     def arm(self, client: Connected, by_holder: bool, emergency: int, back: int) -> None:
-        """A client that answers a fresh observation can arm the robot if a client has control.
-
-        It must be a person, or, if anyone may arm, a program in control without an emergency.
-        """
+        """Arms on a fresh observation: a person, or, if anyone may, the program in control."""
         client = self.actor(client, by_holder)
         answers = client.answers(back)
         orders = self.send(client, link.Arm(answers=answers, emergency=emergency))
@@ -169,10 +166,7 @@ class Robot(stateful.RuleBasedStateMachine):
         scale: float,
         ttl_ms: int,
     ) -> None:
-        """A client sends a command, which may be old, repeated, invalid, or answer any number.
-
-        Half of the commands are valid, and sent by the holder if there is one.
-        """
+        """A command may be old, repeated or invalid; half are valid and sent by the holder."""
         if by_holder:
             ahead, back, values = 1, 0, (0.5, -1.0)
         client = self.actor(client, by_holder)
@@ -292,7 +286,6 @@ class Robot(stateful.RuleBasedStateMachine):
         return sent_ns is not None and self.clock.ns - sent_ns <= MAX_AGE_NS
 
     def send(self, client: Connected, message: Any) -> list[Order]:
-        """Send a message from a client, and return the orders that it caused."""
         before = len(self.orders)
         client.session.receive(link.encode(message))
         return self.orders[before:]

@@ -31,8 +31,6 @@ _MOST_OPERATIONS = 100
 
 
 class _Bench:
-    """The hardware of a driver, and its state."""
-
     def __init__(self, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self.driver, self.settings = _OUTPUTS[name]
         self.hardware = FakeHardware({0x40: {0x00: 0x11, 0x01: 0x04, 0xFE: 0x1E}})
@@ -110,7 +108,6 @@ _ON_A_BUS = {"bus_servo"}
 
 
 def test_every_driver_is_covered() -> None:
-    """Each registered output driver takes part in these tests."""
     assert {driver for driver, _ in _OUTPUTS.values()} == set(OUTPUTS) - _ON_A_BUS
 
 
@@ -122,7 +119,6 @@ _takes_effect = pytest.mark.parametrize("takes_effect", [False, True])
 def test_after_a_failure_the_next_write_reaches_the_hardware(
     bench: Bench, before: float, asked: float, takes_effect: bool
 ) -> None:
-    """Whichever operation fails, and whether or not it took effect, the next write applies."""
     for after in (0.0, before, asked):
         expected = _state_after(bench, before, after)
         for operation, tried in _benches(bench):
@@ -139,7 +135,6 @@ def test_after_a_failure_the_next_write_reaches_the_hardware(
 def test_after_a_failed_release_the_next_one_reaches_the_hardware(
     bench: Bench, takes_effect: bool
 ) -> None:
-    """After a failed release, a second release and a write both take effect."""
     expected: list[dict[str, Any]] = []
     for operation, tried in chain([(0, bench())], _benches(bench)):  # No operation has number 0.
         output = tried.open()

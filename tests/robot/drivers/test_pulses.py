@@ -111,7 +111,6 @@ def test_chip_is_set_up_asleep_and_woken(
 
 
 def test_pulse_is_in_whole_steps() -> None:
-    """Pulses are multiples of 4.88 us, and `write` returns the value in effect."""
     hardware = FakeHardware({0x40: _asleep()})
     servo = hardware.output("servo", **_ON_CHIP, channel=15)
     assert servo.write(0.0, 0) == pytest.approx((307 * 4.88 - 1500) / 500)

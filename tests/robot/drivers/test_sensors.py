@@ -79,10 +79,7 @@ def _echo(hardware: FakeHardware, seconds: float) -> None:
 
 
 def test_an_echo_gives_the_distance_and_pings_are_60_ms_apart() -> None:
-    """The distance is half the echo time times the speed of sound, up to `max_m`.
-
-    With shorter intervals, a ping could receive the echo of the previous ping.
-    """
+    """With shorter intervals, a ping could receive the echo of the previous one."""
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
     pings: list[int] = []

@@ -13,7 +13,6 @@ from tests.robot.profile.texts import EVERYTHING
 
 
 def test_names_and_paths() -> None:
-    """Shipped names resolve to their files, and paths to themselves; other names are refused."""
     assert find_profile("car") == shipped_profiles()["car"]
     assert find_profile("car.toml") == Path("car.toml")
     assert find_profile("robots/car") == Path("robots/car")
@@ -83,7 +82,6 @@ def rover(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("kind", shipped_profiles())
 def test_a_new_profile_differs_only_in_its_name(kind: str, tmp_path: Path) -> None:
-    """All other lines equal the shipped file's, including comments."""
     path = write_profile(kind, tmp_path / "new" / "my.toml", 'Ann\'s "7" \\ ü')
     profile = load_profile(path)
     assert profile.name == 'Ann\'s "7" \\ ü'

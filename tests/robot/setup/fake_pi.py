@@ -6,10 +6,7 @@ from shapechanger.robot.setup.install import Machine, RootCommand
 
 
 class FakePi:
-    """Files of a Raspberry Pi below `root`, and commands with their effects on them.
-
-    `config` is the content of its config.txt, None for no such file; its groups have no members.
-    """
+    """Files of a Raspberry Pi below `root`; without a `config`, it has no config.txt."""
 
     def __init__(
         self,

@@ -159,10 +159,7 @@ class InProcessRobot:
         return self._board.pins
 
     def start(self, place: Callable[[], object] | None = None) -> Observation:
-        """Restart the robot, arm it, and return the first observation.
-
-        `place` places the vehicle, before and after arming.
-        """
+        """Restart and arm the robot; `place` places the vehicle before and after arming."""
         if place is not None:
             place()  # Otherwise a moving vehicle would roll on while the robot starts.
         self._start()
@@ -177,10 +174,7 @@ class InProcessRobot:
         return self._observe()
 
     def step(self, values: Sequence[float]) -> tuple[Observation, bool]:
-        """Send a command, and advance one control period.
-
-        Return the observation at its end, and whether the robot bumped into something.
-        """
+        """Advance one control period with a command; return what is seen, and if it bumped."""
         bumps = self._orders.state.bumps
         self._seq += 1
         command = Command(seq=self._seq, answers=0, values=tuple(values), ttl_ms=self._deadline_ms)
@@ -221,7 +215,6 @@ class InProcessRobot:
         self._orders.waiting.append(msgspec.structs.replace(order, frame_ns=self.now_ns))
 
     def _advance(self, ns: int) -> None:
-        """Advance time, with a round of the guard at each of its ticks."""
         assert self._guard is not None
         end_ns = self.now_ns + ns
         while self.now_ns < end_ns:

@@ -28,8 +28,6 @@ _DISTANCE = SensorPlan("sonar", "hcsr04", "distance", {"trigger": 20, "echo": 21
 
 
 class _Rig:
-    """A car with one sensor, in this process."""
-
     def __init__(self, sensor: SensorPlan) -> None:
         plan = replace(CAR, sensors=(sensor,), enable_pin=None)
         self.world = DrivingWorld({"wheels", "steering"}, (160, 120), seed=1)

@@ -71,11 +71,7 @@ def tensed() -> Iterator[_Bench]:
 
 
 def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
-    """Flexors are wound in, with at most their largest tension and their gears' friction.
-
-    No servo has torque before the first command. At the command 0, each servo pulls with its
-    pretension, within one count of its goal.
-    """
+    """No servo has torque before the first command; at 0, each pulls with its pretension."""
     assert bench.seen.armed
     assert not any(servo.has_torque for servo in bench.rig.servos.values())
     bench.drive(_FLEX, 100)

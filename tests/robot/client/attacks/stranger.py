@@ -47,10 +47,7 @@ def header(length: int, opcode: int = BINARY, *, end: bool = True) -> bytes:
 
 
 class Stranger:
-    """A TCP connection from `source`, in 127.0.0.0/8, to a robot on 127.0.0.1.
-
-    `version` is the newest version of TLS that the client offers; None for plain TCP.
-    """
+    """A connection from `source`, in 127.0.0.0/8, with TLS up to `version`, or plain TCP."""
 
     def __init__(
         self,
@@ -191,7 +188,6 @@ class Stranger:
         return self.nonce
 
     def hello(self, key: bytes, role: str = "program", **fields: Any) -> None:
-        """Open the link, and prove to hold a key."""
         nonce = self.challenge()
         self.proof = proof(key, nonce, self.certificate, role)
         self.send("hello", **{"version": 1, "proof": self.proof, "role": role, **fields})

@@ -52,7 +52,6 @@ def settings(**changes: Any) -> BusSettings:
 
 
 def of(family: str, **changes: Any) -> BusSettings:
-    """Return the settings of a bus of a family, "Dynamixel" or "Feetech"."""
     make = feetech if family == "Feetech" else servo
     return settings(servos=tuple(make(name) for name in NAMES), **changes)
 

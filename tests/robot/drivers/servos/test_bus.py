@@ -8,7 +8,6 @@ from tests.robot.drivers.servos.rigs import NAMES, Rig, of, servo, settings
 
 @pytest.mark.parametrize("family", ["Dynamixel", "Feetech"])
 def test_missing_servos_and_another_model_are_refused(family: str) -> None:
-    """The error names all missing servos, or the servo that is of another model."""
     rig = Rig(of(family))
     rig.twin("FDS").mute = rig.twin("PI").deaf = True
     text = r"no servo answers as FDS \(id 2\), PI \(id 7\); these answer: FDP \(id 1\), EIP"
@@ -64,10 +63,7 @@ def test_setup_configures_servos_without_torque(family: str, expected: str) -> N
 def test_a_setting_that_is_not_kept_is_an_error(
     family: str, register: int, data: bytes, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A Dynamixel servo reports refusals; registers of a Feetech servo are read back instead.
-
-    After the error, the torque of all servos is off.
-    """
+    """Dynamixel servos report refusals; registers of Feetech servos are read back instead."""
     rig = Rig(of(family))
     servo = rig.twin("EDC")
     taken = servo.write

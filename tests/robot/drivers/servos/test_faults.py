@@ -84,10 +84,7 @@ def test_a_fault_of_one_servo_stops_all(family: str, fault: _Fault, text: str) -
 
 
 def test_a_short_silence_is_tolerated() -> None:
-    """Servos behind a silent one are read in a second packet; a short loss causes no stop.
-
-    There are few retries, because the guard cannot stop the robot during a timeout.
-    """
+    """Servos behind a silent one are read in a second packet, with few retries."""
     rig = Rig().start()
     rig.run(4.0, 3)
     rig.twin("FDS").mute = True

@@ -175,10 +175,7 @@ def _see(one: TendonServo, mm_per_s: float, now_ms: int, length_mm: float = 0.0)
 
 
 def test_a_lost_tendon_is_detected() -> None:
-    """A tendon counts as lost after 100 ms above 140 mm/s, 70 % of the speed without load.
-
-    A tendon that is wound in further than the finger allows counts as lost at once.
-    """
+    """A tendon is lost after 100 ms above 140 mm/s, or once it is wound in too far."""
     one = _one(servo("FDP"))
     speeds = [(500, 0), (-150, 0), (-150, 99), (-130, 100), (-150, 110), (-150, 209)]
     assert [_see(one, speed, at_ms) for speed, at_ms in speeds] == [""] * 6
@@ -189,10 +186,7 @@ def test_a_lost_tendon_is_detected() -> None:
 @pytest.mark.parametrize("name", sorted(MODELS))
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_simulated_motor_matches_its_data_sheet(name: str, direction: int) -> None:
-    """A motor reaches its speed without load; a blocked tendon has the tension kt i / r.
-
-    The tension is within the friction of the gears: the spool overshoots, and friction holds it.
-    """
+    """Without load it has its speed; a blocked tendon has kt i / r, within the friction."""
     model, make = MODELS[name], feetech if name == "STS3215" else servo
     for snapped, amperes in ((True, model.stall_a), (False, 0.4 * model.stall_a)):
         motor = SimulatedMotor(make("FDP", model=name, direction=direction))

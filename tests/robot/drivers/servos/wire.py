@@ -37,10 +37,7 @@ def size_of(data: bytes | bytearray, family: ServoFamily = DYNAMIXEL) -> int:
 
 
 def execute(bus: Rig, packet: bytes) -> dict[int, bytes]:
-    """Execute a packet on the bus and return the status packets by servo id.
-
-    A damaged packet of protocol 1.0 is ignored. Packets of 2.0 are not checked.
-    """
+    """Execute a packet; return status packets by id. Only protocol 1.0 is checked."""
     family = family_of(bus)
     if family is FEETECH:
         if ~sum(packet[2:-1]) & 0xFF != packet[-1]:

@@ -120,7 +120,6 @@ def test_a_person_is_asked_before_the_pins_are_made_safe(bench: Any) -> None:
 
 
 def test_pins_that_stay_driven_are_bad(bench: Any) -> None:
-    """The error becomes a finding that names these pins."""
     bench.close = MagicMock(side_effect=[["GPIO22 is stuck."], []])
     found = fault_finding(bench, _fault(bench), 1)
     assert found == ("bad", "Not everything is at rest: GPIO22 is stuck.")
