@@ -83,5 +83,4 @@ class AlwaysForward:
         """Do nothing."""
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the intended and the executed action."""
         return np.array([0.0, 0.5], np.float32), np.array([0.25, 0.5], np.float32)

@@ -125,7 +125,6 @@ def test_driving_faster_backward_or_aside_is_corrected(
 
 
 def clone(path: Path, observation: Layout | None = None) -> str:
-    """Save an untrained policy for the state of the corridor, and return its path."""
     env = CorridorEnv("state")
     net = {"eyes": "none", "nerves": (8,), "low": (-1.0, -1.0), "high": (1.0, 1.0)}
     card = clone_card(env.action_layout, observation or env.observation_layout, **net)

@@ -36,7 +36,6 @@ FORWARD = np.array([0.5, 1.0], np.float32)
 
 
 def drive(env: gym.Env[Any, Any], steps: int, seed: int | None = None) -> None:
-    """Take a number of steps, over as many episodes as needed."""
     over = True
     for _ in range(steps):
         if over:
@@ -209,8 +208,6 @@ def test_an_env_does_not_move_if_its_recording_is_in_use(tmp_path: Path) -> None
 
 
 def test_an_env_that_fails_leaves_a_closed_episode(tmp_path: Path) -> None:
-    """The outcome distinguishes Ctrl-C from an error."""
-
     class Failing(CorridorEnv):
         error: type[BaseException] = KeyboardInterrupt
 

@@ -22,11 +22,9 @@ class Rear:
         self.weight = weight
 
     def reward(self, robot: RobotState) -> dict[str, float]:
-        """Return the height of the trunk, and the angle of the back leg as a cost."""
         return {"height": self.weight * robot.height, "servo": -abs(robot["back/angle"])}
 
     def terminated(self, robot: RobotState) -> bool:
-        """Return whether the dog lies on its back."""
         return robot.up < 0.0
 
 
@@ -34,7 +32,6 @@ class Nonsense:
     """A task whose reward is not a number."""
 
     def reward(self, robot: RobotState) -> dict[str, float]:
-        """Return NaN."""
         return {"nonsense": float("nan")}
 
 
@@ -44,7 +41,6 @@ class Hoist:
     observe = ("lift/position", "lift/velocity")
 
     def reward(self, robot: RobotState) -> dict[str, float]:
-        """Return the distance, m, as a cost."""
         return {"near": -abs(robot["lift/position"] - 0.5)}
 
 
@@ -52,7 +48,6 @@ class Move:
     """Move all joints of any robot."""
 
     def reward(self, robot: RobotState) -> dict[str, float]:
-        """Return the mean speed of the joints, at most 1, and the cost of the actions."""
         return {
             "speed": float(np.clip(np.abs(robot.data.qvel), 0.0, 1.0).mean()),
             "control": -0.1 * float(np.square(robot.scaled_action).mean()),

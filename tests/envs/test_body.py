@@ -165,7 +165,6 @@ def test_the_spec_and_a_pickle_make_the_same_model(env_id: str) -> None:
 
 
 def test_the_spec_holds_the_body_as_json() -> None:
-    """Bodies given as edits are JSON in the spec."""
     arguments = {"healthy_z_range": (0.1, 3.0), "ctrl_cost_weight": 0.125, "fast_model": False}
     with gym.make("shapechanger/Ant-v1", body=_OTHER, **arguments) as env:
         assert env.spec.kwargs == {"body": to_json(_OTHER), **arguments}
@@ -182,7 +181,6 @@ def test_the_spec_holds_the_body_as_json() -> None:
 
 
 def test_an_assigned_spec_is_not_modified() -> None:
-    """A spec that is set on an env is copied before it is changed."""
     spec = gym.spec("shapechanger/BigAnt-v1")
     with gym.make("shapechanger/Ant-v1") as env:
         env.unwrapped.spec = spec
@@ -199,7 +197,6 @@ def test_an_assigned_spec_is_not_modified() -> None:
 
 @pytest.mark.parametrize("body", ["BigAnt", "AmputatedAnt", _OTHER], ids=["big", "cut", "other"])
 def test_everything_follows_the_body(ant: Any, body: BodyLike) -> None:
-    """An env that changed its body equals one that was made with it."""
     observation, _ = ant.reset(seed=6, options={"body": body})
     with gym.make("shapechanger/Ant-v1", body=body) as made:
         expected, _ = made.reset(seed=6)
@@ -215,7 +212,6 @@ def test_everything_follows_the_body(ant: Any, body: BodyLike) -> None:
 
 @pytest.mark.parametrize("factor", [0.3, 0.5, 0.75, 0.9])
 def test_small_ants_land_from_their_start(factor: float) -> None:
-    """Short-legged ants stay healthy while they fall from their start."""
     with gym.make("shapechanger/Ant-v1", body=Stretch("shank_*", factor)) as env:
         env.action_space.seed(0)
         for seed in range(10):
@@ -225,7 +221,6 @@ def test_small_ants_land_from_their_start(factor: float) -> None:
 
 
 def test_heights_and_ranges_follow_the_body(ant: Any) -> None:
-    """Heights, ranges and gains are derived again for a new body."""
     env = ant.unwrapped
     small, data, model = env.standing_height, env.data, env.model
     ant.reset(seed=0, options={"body": (*_BIG, JointRange("hip_1", -0.1, 0.2))})
@@ -299,7 +294,6 @@ _WEAKER = (Lock("hinge"), Split("pole", "hinge", lower=-1.0, upper=1.0, gear=9.0
 def test_other_motors_are_refused(
     name: str, arguments: dict[str, Any], body: Any, sentence: str, tmp_path: Path
 ) -> None:
-    """Added or removed motors, another order of motors and other bounds of controls are refused."""
     if name == "InvertedPendulum":
         arguments = {"xml_file": _pendulum_with_a_motor_on_its_hinge(tmp_path)}
     with gym.make(f"shapechanger/{name}-v1", **arguments) as env:

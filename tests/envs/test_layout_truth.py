@@ -58,7 +58,6 @@ def _made(case: str) -> Iterator[Any]:
 
 @pytest.fixture(params=_CASES)
 def env(request: pytest.FixtureRequest) -> Iterator[Any]:
-    """An unwrapped env after a reset."""
     yield from _made(request.param)
 
 
@@ -71,7 +70,6 @@ def ant(request: pytest.FixtureRequest) -> Iterator[Any]:
 
 
 def _sensed(env: Any, pose: np.ndarray, velocity: np.ndarray) -> dict[str, float]:
-    """Return the observation in a state, by feature name."""
     env.set_state(pose, velocity)
     return dict(zip(env.observation_layout.names, env._get_obs(), strict=True))
 
@@ -241,7 +239,6 @@ def test_a_motor_drives_its_own_joint(env: Any) -> None:
 
 
 def test_features_name_elements_of_the_model(env: Any) -> None:
-    """Each feature's element is an existing joint, body or actuator."""
     for feature in (*env.observation_layout, *env.action_layout):
         assert feature.element is not None
         assert getattr(env.model, feature.element.kind)(feature.element.name).id >= 0

@@ -24,7 +24,6 @@ _BLOCKS = {
 
 
 def _sensed(env: Any) -> dict[str, float]:
-    """Return the current observation, by feature name."""
     return dict(zip(env.observation_layout.names, env._get_obs(), strict=True))
 
 
@@ -44,7 +43,6 @@ def humanoid() -> Iterator[Any]:
 
 @pytest.fixture
 def poles() -> Iterator[Any]:
-    """A double pendulum after a reset."""
     with gym.make("shapechanger/InvertedDoublePendulum-v1") as made:
         made.reset(seed=0)
         yield made.unwrapped
@@ -100,7 +98,6 @@ def test_a_motor_changes_the_drive_of_its_joint(humanoid: Any) -> None:
 
 
 def test_contacts_are_not_clipped(humanoid: Any) -> None:
-    """Each body has six unclipped numbers, torque before force."""
     before = _sensed(humanoid)
     for name in _bodies(humanoid):
         written = np.array([100.0, -200.0, 300.0, -400.0, 500.0, -600.0])
@@ -158,7 +155,6 @@ def test_the_rail_limits_give_a_force(poles: Any) -> None:
 
 @pytest.mark.parametrize("name", ["Hopper", "Walker2d"])
 def test_planar_velocities_are_clipped(name: str) -> None:
-    """Observed velocities are clipped to 10, the simulation's are not."""
     with gym.make(f"shapechanger/{name}-v1") as made:
         env: Any = made.unwrapped
         made.reset(seed=0)

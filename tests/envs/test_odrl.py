@@ -218,7 +218,6 @@ def _require_equal(a: mujoco.MjModel, b: mujoco.MjModel, *fields: str) -> None:
 @pytest.mark.parametrize("factor", _FACTORS)
 @pytest.mark.parametrize("robot", _ROBOTS)
 def test_gravity_is_scaled(robot: str, factor: float) -> None:
-    """Gravity is scaled, and masses, frictions, ranges and sizes are unchanged."""
     model, source = _model(f"odrl-{robot}-gravity-{factor}"), _source(f"odrl-{robot}")
     np.testing.assert_allclose(model.opt.gravity, [0.0, 0.0, -9.81 * factor], atol=1e-12)
     _require_equal(model, source, "body_mass", "geom_friction", "jnt_range", "geom_size")

@@ -124,7 +124,6 @@ with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", width=64, height=4
 @pytest.mark.gl
 @pytest.mark.usefixtures("osmesa")
 def test_osmesa_draws() -> None:
-    """A frame is rendered with OSMesa when EGL is missing."""
     without_egl = (
         "import ctypes.util\n"
         "found = ctypes.util.find_library\n"
@@ -136,5 +135,4 @@ def test_osmesa_draws() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("egl")
 def test_egl_draws() -> None:
-    """A frame is rendered with EGL by default."""
     assert _output(_DRAW).splitlines() == ["egl (48, 64, 3) True", "True"]

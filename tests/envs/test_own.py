@@ -42,7 +42,6 @@ REAR = "tests.envs.own_robots:Rear"
 
 @pytest.fixture
 def dog(tmp_path: Path) -> Path:
-    """Return the file of the dog."""
     path = tmp_path / "dog.xml"
     path.write_text(DOG)
     return path
@@ -141,7 +140,6 @@ def test_a_robot_without_shapes_is_accepted(tmp_path: Path) -> None:
 
 
 def test_every_number_can_be_read(dog: Path) -> None:
-    """Any number of the robot can be read by its name; unknown names are refused."""
     inner = _inner(shapechanger.from_mjcf(dog, Rear))
     robot = inner.seen(np.zeros(2), np.zeros(3))
     assert robot["trunk/x"] == inner.data.qpos[0]
@@ -268,7 +266,6 @@ def test_fixed_robots_have_tasks_too(tmp_path: Path) -> None:
 
 
 def test_velocity_servos_have_a_unit(dog: Path) -> None:
-    """A velocity servo's control is a velocity; other actuators with a bias are plain motors."""
     dog.write_text(
         DOG.replace(
             '<position name="back" joint="back" kp="40"',

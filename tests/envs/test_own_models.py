@@ -62,7 +62,6 @@ def test_a_urdf_is_rigged(tmp_path: Path) -> None:
 
 
 def test_unnamed_elements_get_names(tmp_path: Path) -> None:
-    """Joints are named after their bodies, actuators after their joints."""
     text = (
         '<mujoco><worldbody><body><joint/><geom size=".1"/></body></worldbody><actuator><motor '
         'joint="j" ctrlrange="-1 1"/></actuator></mujoco>'
@@ -191,7 +190,6 @@ def descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
 
 
 def test_robots_of_the_package_have_names(descriptions: Path) -> None:
-    """Modules of the package give the paths of MJCF and URDF files."""
     assert own_family("leg_mj_description").path == (descriptions / "leg.xml").resolve()
     family = own_family("arm_description", (AddMotor("*", 1.0),))
     np.testing.assert_array_equal(compile_body(family.load(family.path)).actuator_gear[:, 0], 1.0)

@@ -32,13 +32,11 @@ _MOTORS = (
 
 
 def still(robot: Any) -> dict[str, float]:
-    """A task without a goal."""
     del robot
     return {"still": 0.0}
 
 
 def _env(folder: Path, text: str, task: Any = "walk", **more: Any) -> tuple[Any, Any]:
-    """Return an env of a model, and the same env without its wrappers."""
     file = folder / "robot.xml"
     file.write_text(text)
     env = shapechanger.from_mjcf(file, task, **more)

@@ -30,12 +30,10 @@ class Still:
         self.weight = weight
 
     def reward(self, robot: RobotState) -> dict[str, float]:
-        """Return one term."""
         return {"still": -self.weight * abs(robot.velocity[0])}
 
 
 def climb(robot: RobotState) -> dict[str, float]:
-    """Return the height as reward."""
     return {"height": robot.height}
 
 

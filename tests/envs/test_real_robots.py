@@ -220,7 +220,6 @@ def test_a_robot_passes_the_exam(robot: _Robot) -> None:
 
 @each_robot
 def test_a_training_on_a_robot_gives_finite_weights(robot: _Robot) -> None:
-    """The weights are finite after 2,048 steps of PPO."""
     task = f"{Move.__module__}:{Move.__qualname__}"
     arguments = {"path": str(robot.file), "task": task, "rig": to_json(robot.rig)}
     env = EnvRef("shapechanger/OwnRobot-v1", {**arguments, "max_episode_steps": 50})

@@ -29,14 +29,12 @@ _SHAPES = [
 
 @pytest.fixture
 def ant() -> Iterator[Any]:
-    """An ant that renders frames."""
     with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **_SIZE) as env:
         env.reset(seed=0)
         yield env
 
 
 def _hide(env: Any, *, but: str = "") -> None:
-    """Make all geoms of the body transparent, except `but`."""
     model = env.unwrapped.model
     for geom in np.flatnonzero(model.geom_bodyid > 0):
         model.geom_rgba[geom, 3] = float(model.geom(geom).name == but)
@@ -153,7 +151,6 @@ def test_the_camera_follows_the_body(name: str, moved: tuple[float, ...]) -> Non
 
 
 def test_a_given_lookat_is_fixed() -> None:
-    """With `lookat` the camera does not follow the body."""
     camera = {"lookat": np.array([0.0, 0.0, 0.5]), "distance": 6.0, "elevation": -30.0}
     with gym.make(
         "shapechanger/Ant-v1", render_mode="rgb_array", default_camera_config=camera, **_SIZE
@@ -172,7 +169,6 @@ def test_a_given_lookat_is_fixed() -> None:
 
 
 def test_frames_follow_the_body(ant: Any) -> None:
-    """After a reset with a new body, frames equal an env's that was made with it."""
     before = ant.render()
     ant.reset(seed=0, options={"body": "BigAnt"})
     after = ant.render()
@@ -186,7 +182,6 @@ def test_frames_follow_the_body(ant: Any) -> None:
 
 
 def test_the_camera_settings_are_kept() -> None:
-    """Camera, size and options are kept when the body changes."""
     camera = {"distance": 9.0, "trackbodyid": 0, "elevation": -80.0}
     arguments = {"default_camera_config": camera, "max_geom": 500, "visual_options": {0: True}}
     with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **arguments, **_SIZE) as env:
@@ -204,7 +199,6 @@ def test_the_camera_settings_are_kept() -> None:
 
 
 def test_the_old_renderer_is_freed(ant: Any) -> None:
-    """Model, viewer and context of the old body are freed."""
     ant.render()
     renderer = ant.unwrapped.mujoco_renderer
     context = renderer.viewer.opengl_context
@@ -314,7 +308,6 @@ def test_a_window_opens(display: str) -> None:
 # Compiling MoviePy 1 for the first time warns, before Python 3.12 of a deprecation.
 @pytest.mark.filterwarnings("ignore::SyntaxWarning", "ignore:invalid escape:DeprecationWarning")
 def test_gymnasium_records_videos(tmp_path: Path) -> None:
-    """`RecordVideo` works with the extra `sim`."""
     env = RecordVideo(
         gym.make("shapechanger/InvertedPendulum-v1", render_mode="rgb_array"),
         str(tmp_path / "videos"),
@@ -378,7 +371,6 @@ def _textured(**arguments: Any) -> Any:
 
 
 def test_only_textures_differ_without_rendering() -> None:
-    """All other arrays are equal with and without rendering."""
     plain, drawn = _textured(), _textured(render_mode="rgb_array")
     assert plain.ntexdata < 0.3 * drawn.ntexdata
     flat = plain.tex_type == mujoco.mjtTexture.mjTEXTURE_2D  # Floors are unchanged.
@@ -416,7 +408,6 @@ def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shad
 
 
 def test_a_frame_shows_edited_colours() -> None:
-    """Colours edited in the public model are rendered."""
     size = {"width": 64, "height": 64}
     with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **size) as env:
         env.reset(seed=0)

@@ -65,7 +65,6 @@ def test_a_task_keeps_bodies_layouts_and_certificates(task: str) -> None:
 
 
 def test_a_preset_trains_the_task(task: str, tmp_path: Path) -> None:
-    """A TOML file of settings works as for a task of the catalogue."""
     file = tmp_path / "high.toml"
     file.write_text(_PRESET)
     learner = learner_of(*resolve_learner(str(file), {}))

@@ -37,7 +37,6 @@ def test_each_reset_draws_a_body_between_the_two() -> None:
 
 
 def test_a_given_body_overrides_towards() -> None:
-    """A body in the options applies to one reset."""
     env = gym.make("shapechanger/Ant-v1", towards="BigAnt", fast_model=False)
     env.reset(seed=0, options={"body": "BigAnt"})
     (big,) = _heights(gym.make("shapechanger/BigAnt-v1"), [0])
@@ -46,7 +45,6 @@ def test_a_given_body_overrides_towards() -> None:
 
 
 def test_vector_envs_draw_one_body_per_env() -> None:
-    """Each env draws the same body as a single env with its seed."""
     envs = shapechanger.make_vec("shapechanger/Ant-v1", 3, towards="BigAnt", fast_model=False)
     envs.reset(seed=5)
     drawn = [env.unwrapped.standing_height for env in envs.envs]

@@ -101,7 +101,6 @@ def one_to_one(draw: st.DrawFn) -> BodyMap:
 @law
 @given(links=chains(3))
 def test_composition_is_associative(links: list[BodyMap]) -> None:
-    """The grouping of three maps does not matter."""
     a, b, c = links
     left, right = a.then(b).then(c), a.then(b.then(c))
     assert left == right
@@ -111,7 +110,6 @@ def test_composition_is_associative(links: list[BodyMap]) -> None:
 @law
 @given(built=maps())
 def test_the_identity_is_neutral(built: BodyMap) -> None:
-    """Composing with the identity on either side changes nothing."""
     before = BodyMap.identity(built.source_observation, built.source_action)
     after = BodyMap.identity(built.target_observation, built.target_action)
     assert before.then(built) == built == built.then(after)
@@ -186,7 +184,6 @@ def test_a_mirror_is_its_own_inverse(legs: int, flip: bool, order: object) -> No
 def test_matched_entries_are_bit_exact(
     dtype: type, layout: Layout, more: Layout, seed: int
 ) -> None:
-    """Matching features are copied, not computed."""
     target = Layout((*more.features, *(f for f in layout if f.name not in more)))
     built = BodyMap.between(layout, target, layout, target)
     values = np.random.default_rng(seed).normal(size=target.size).astype(dtype)

@@ -63,7 +63,6 @@ def value(estimate: Estimate) -> float:
 def summary_of(
     arm: LearningCurves, scratch: LearningCurves, reference: Reference, source: float
 ) -> Summary:
-    """Summarise with a fixed seed and only the last evaluation."""
     return summarise(
         scratch, arm, reference, source_steps=source, rng=np.random.default_rng(0), last_k=1
     )

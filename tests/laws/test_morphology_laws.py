@@ -98,7 +98,6 @@ def test_edits_of_size_compose_by_multiplication(
     ],
 )
 def test_a_factor_of_one_is_the_identity(load: Callable[[], mujoco.MjSpec], edit: Edit) -> None:
-    """The models are equal bit for bit."""
     assert differing(built(load()), built(load(), edit)) == []
 
 
@@ -162,7 +161,6 @@ def test_mass_scales_as_density(body: str, factor: float) -> None:
     )
 )
 def test_edits_of_different_bodies_commute(edits: tuple[Edit, Edit]) -> None:
-    """The order of independent edits does not matter."""
     a, b = built(leg(), *edits), built(leg(), *reversed(edits))
     for field in differing(a, b):
         np.testing.assert_allclose(
@@ -236,7 +234,6 @@ def test_a_copied_limb_is_rotated(angle: float, hip: float, knee: float) -> None
 def test_adding_and_removing_restores_the_model(
     load: Callable[[], mujoco.MjSpec], add: Edit, name: str
 ) -> None:
-    """The models are equal bit for bit."""
     assert differing(built(load()), built(load(), add)) != []
     assert differing(built(load()), built(load(), add, Remove(name))) == []
 
@@ -284,7 +281,6 @@ _BODIES = st.lists(st.sampled_from(_KINDS).flatmap(_edits), max_size=3).map(tupl
 @given(data=st.data())
 @pytest.mark.parametrize("kind", _KINDS)
 def test_edits_round_trip_through_json(kind: type[Edit], data: st.DataObject) -> None:
-    """Each kind of edit, with any values and amounts, is equal after it is written and read."""
     edit = data.draw(_edits(kind))
     text = to_json([edit])
     assert from_json(text) == (edit,) == as_body(text)

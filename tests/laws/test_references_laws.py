@@ -77,7 +77,6 @@ _EDITS: dict[type[Edit], st.SearchStrategy[Any]] = {
 def test_references_are_correct_after_an_edit(
     kind: type[Edit], mechanism: Mechanism, data: st.DataObject
 ) -> None:
-    """All references are correct after any edit that is not refused."""
     edit = data.draw(_EDITS[kind])
     before = mechanism.spec().compile()
     try:
@@ -101,7 +100,6 @@ class _Check:
         self.copied = {n.removesuffix("_2") for n in _names(after, "body") if n.endswith("_2")}
 
     def everything(self) -> None:
-        """Check every kind of reference."""
         assert b"~" not in bytes(self.after.names)
         self.pin()
         self.couplings()
@@ -116,7 +114,6 @@ class _Check:
         self.skin()
 
     def has(self, kind: str, name: str) -> bool:
-        """Return whether the edited model has an element."""
         return name in _names(self.after, kind)
 
     def pin(self) -> None:
@@ -154,7 +151,6 @@ class _Check:
         return dict(zip(names, places, strict=True))
 
     def body_of_site(self, site: str) -> str:
-        """Return the body of a site in the edited model."""
         return self.after.body(int(self.after.site(site).bodyid[0])).name
 
     def couplings(self) -> None:

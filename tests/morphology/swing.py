@@ -86,7 +86,6 @@ class Wrapper:
 
     @property
     def unwrapped(self) -> Any:
-        """The environment inside all wrappers."""
         return getattr(self.env, "unwrapped", self.env)
 
     def reset(self, *, seed: int | None = None) -> tuple[Any, dict[str, Any]]:

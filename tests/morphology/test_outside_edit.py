@@ -64,7 +64,6 @@ LEGS = Family(
 
 @pytest.fixture
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Import the file, as a module of another package."""
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "outside_edit.py").write_text(_FILE, encoding="utf-8")
     monkeypatch.delitem(sys.modules, "outside_edit", raising=False)

@@ -186,7 +186,6 @@ def _gap(model: mujoco.MjModel, pose: np.ndarray) -> float:
 @pytest.mark.parametrize("jacobian", ["dense", "sparse"])
 @given(seed=st.integers(0, 1000), scale=st.sampled_from([0.05, 0.3]))
 def test_a_drawn_start_closes_loops(jacobian: str, seed: int, scale: float) -> None:
-    """The pose is inside the limits, and the velocities open no loop."""
     model = mujoco.MjModel.from_xml_string(_FOUR_BAR.format(jacobian=jacobian))
     data, rules = mujoco.MjData(model), StartRules(model)
     start = start_pose(model)

@@ -30,7 +30,6 @@ def fill_the_disk(report: ReportSteps) -> None:
 
 
 def vanish(mark: str, report: ReportSteps) -> None:
-    """End by SIGKILL."""
     _append(mark)
     os.kill(os.getpid(), signal.SIGKILL)
 

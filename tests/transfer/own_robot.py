@@ -71,5 +71,4 @@ def plan_of(name: str, seeds: int = 2, **more: Any) -> Plan:
 
 
 def study_of(plan: Plan, out: Path) -> Study:
-    """Perform a study in this process."""
     return run_study(plan, out, executor=Serial())

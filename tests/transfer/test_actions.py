@@ -72,7 +72,6 @@ def _trained(folder: Path, name: str, unit: str, actuator: str) -> tuple[Any, li
 def test_the_unit_of_an_actuator_does_not_change_learning(
     tmp_path: Path, name: str, units: tuple[str, ...]
 ) -> None:
-    """Training gives bitwise equal weights in every unit of the actuator."""
     policy, curve = _trained(tmp_path, name, "share", _UNITS["share"])
     assert len({evaluation.mean_return for evaluation in curve}) > 1
     for unit in units:
@@ -176,7 +175,6 @@ def _pair(env_id: str, threads: int, **more: Any) -> tuple[Any, Any]:
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("env_id", [_PENDULUM, "shapechanger/Ant-v1", "shapechanger/Hopper-v1"])
 def test_results_equal_stable_baselines3(env_id: str, threads: int) -> None:
-    """Observations, rewards, ends and infos are equal, also in VecMonitor."""
     ours, theirs = (VecMonitor(one) for one in _pair(env_id, threads, max_episode_steps=60))
     for one in (ours, theirs):
         one.seed(5)

@@ -45,7 +45,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 
 def test_demonstrations_pair_images_with_intended_actions() -> None:
-    """Each image has the action that the demonstrator intended when it saw the image."""
     shown = record_demonstrations(LANE, 150, 20, 3, _FRAMING)
     assert shown.pictures is not None
     assert shown.pictures.shape == (150, 12, 20, 3)
@@ -217,7 +216,6 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of a policy of a pendulum, trained with PPO."""
     path = tmp_path_factory.mktemp("ppo") / "pole.safetensors"
     save_policy(Sb3Learner("tiny", TINY).train(SMALL, 32, 3), path)
     return path

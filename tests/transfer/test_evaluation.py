@@ -85,7 +85,6 @@ def test_random_actions_come_from_the_seed() -> None:
 
 
 def test_one_env_plays_several_episodes() -> None:
-    """A single env plays all episodes one after another, each with its own seed."""
     result = evaluate(lambda o: np.zeros((len(o), 1)), [Countdown()], 3, 7, episodes=3)
     many = evaluate(lambda o: np.zeros((len(o), 1)), [Countdown() for _ in range(3)], 3, 7)
     assert result == many

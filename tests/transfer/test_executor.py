@@ -28,7 +28,6 @@ _ROOT = str(Path(__file__).parents[2])
 
 @pytest.mark.parametrize("executor", [Serial(), Processes(2)], ids=["serial", "processes"])
 def test_jobs_wait_for_those_before_them(executor: Executor, tmp_path: Path) -> None:
-    """A job starts after those that it depends on, whatever the order of the list."""
     names = ("last", "middle", "first")
     marks = {name: tmp_path / name for name in names}
     waits = {"last": ("middle",), "middle": ("first",), "first": ()}

@@ -137,7 +137,6 @@ def test_a_file_alone_imports_no_module(tmp_path: Path, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("learner", EACH[:3])
 def test_a_transplanted_policy_acts_as_the_source(learner: str) -> None:
-    """Before its first update, it acts as the source does, through the body map."""
     policy, curve, settings = trained(learner)
     plan = tiny_plan(settings)
     moved: list[Evaluation] = []

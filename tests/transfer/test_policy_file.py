@@ -151,7 +151,6 @@ def test_harmful_settings_are_refused(settings: dict[str, Any], text: str, tmp_p
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A normalised policy and its ONNX file."""
     folder = tmp_path_factory.mktemp("onnx")
     policy = Sb3Learner("ppo", TINY_NORMALISED).train(SMALL, 32, 0)
     save_policy(policy, folder / "policy.safetensors")
@@ -212,7 +211,6 @@ _ARRAYS = {"first": np.arange(4, dtype=np.float32), "second": np.ones((2, 2), np
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A file with two arrays."""
     made = tmp_path / "policy.safetensors"
     made.write_bytes(tensor_bytes(_ARRAYS, msgspec.json.encode(clone_card())))
     return made

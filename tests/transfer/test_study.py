@@ -46,7 +46,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 @pytest.fixture
 def out(finished: tuple[Study, Path], tmp_path: Path) -> Path:
-    """A copy of the folder of the finished study."""
     return Path(shutil.copytree(finished[1], tmp_path / "study"))
 
 
@@ -106,7 +105,6 @@ def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
 
 
 def test_a_shift_that_changes_nothing_is_refused(tmp_path: Path) -> None:
-    """Equal source and target are refused before any training."""
     with pytest.raises(EmptyShift, match="nothing to transfer across"):
         run_study(tiny_plan(task=TransferTask(BIG, BIG)), tmp_path / "s", executor=Serial())
     assert not (tmp_path / "s").exists()

@@ -78,7 +78,6 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def out(first: Path, tmp_path: Path) -> Path:
-    """A copy of the suite's folder."""
     return Path(shutil.copytree(first, tmp_path / "suite"))
 
 

@@ -117,5 +117,4 @@ def corridor(n: int, seed: int, gain: float = 1.0) -> Dataset:
 
 
 def error(policy: CameraPolicy, test: Dataset) -> float:
-    """Return the mean absolute error of the actions on test images."""
     return float(np.abs(policy.predict_many(test.pictures) - test.actions).mean())

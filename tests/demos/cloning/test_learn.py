@@ -43,7 +43,6 @@ def _cloned(
 
 @pytest.fixture(scope="module")
 def driver() -> Cloned:
-    """A policy that learned to drive in corridors, from 600 images."""
     return _cloned(corridor(600, 1), SMALL)
 
 

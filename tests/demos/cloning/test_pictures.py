@@ -62,7 +62,6 @@ def test_invalid_images_are_refused(pictures: np.ndarray, words: str) -> None:
 
 
 def _bars(upright: bool) -> Tensor:
-    """Return bars of four pixels, shape (1, 3, 32, 32)."""
     bar = 0.3 + 0.5 * (torch.arange(32) // 4 % 2).float()
     rows = bar.expand(32, 32)
     return (rows if upright else rows.T).expand(1, 3, 32, 32).clone()

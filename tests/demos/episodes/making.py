@@ -11,7 +11,6 @@ STATES = Layout((Feature("effort", "N·m"), Feature("distance", "m", 0.0)))
 
 
 def header(**changes: Any) -> EpisodeHeader:
-    """Return the header of a car's episode."""
     fields: dict[str, Any] = {
         "action_layout": ACTIONS,
         "state_layout": STATES,
@@ -22,7 +21,6 @@ def header(**changes: Any) -> EpisodeHeader:
 
 
 def step(number: int = 0, **changes: Any) -> Step:
-    """Return a step at 20 Hz."""
     fields: dict[str, Any] = {
         "action": (0.1, 0.2),
         "driver": "person",

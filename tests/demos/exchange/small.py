@@ -30,7 +30,6 @@ STATES = Layout((Feature("speed", "m/s"), Feature("temperature", "°C", -40.0)))
 
 
 def picture(seed: int, width: int = 40, height: int = 32, *, grey: bool = False) -> bytes:
-    """Return a JPEG of noise."""
     pixels = np.random.default_rng(seed).integers(0, 256, (height, width, 1 if grey else 3))
     return simplejpeg.encode_jpeg(
         pixels.astype(np.uint8),
@@ -54,7 +53,6 @@ def huge(width: int = 60_000, height: int = 60_000) -> bytes:
 
 
 def header(**changes: Any) -> EpisodeHeader:
-    """Return the header of a car with a camera and a state."""
     fields: dict[str, Any] = {
         "action_layout": ACTIONS,
         "state_layout": STATES,

@@ -33,7 +33,6 @@ def plain(number: int, channels: int = 3) -> np.ndarray:
 
 
 def stored(images: list[Any], feature: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Return options of a dataset with images in its table."""
     column = pa.array([{"bytes": data, "path": f"{n}.png"} for n, data in enumerate(images)])
     described = {"dtype": "image", "shape": [SIZE, SIZE, 3], "names": AXES} | (feature or {})
     return {"video": False, "columns": {CAMERA: column}, "features": {CAMERA: described}}
@@ -145,8 +144,6 @@ def test_one_of_several_cameras(tmp_path: Path) -> None:
 
 
 def spoil(name: str, content: bytes | None = None, size: int | None = None) -> Any:
-    """Return a change that replaces or cuts a file."""
-
     def change(folder: Path) -> None:
         path = folder / name
         path.write_bytes(path.read_bytes()[:size] if content is None else content)

@@ -35,7 +35,6 @@ def of(found: list[Message], topic: str) -> list[tuple[int, dict[str, Any]]]:
 
 @pytest.fixture
 def exported(tmp_path: Path) -> Path:
-    """Export an episode with all fields of a step."""
     layout = Layout((Feature("speed", "m/s", 0.0, 4.0), Feature("map", "1", shape=(2,))))
     rest: dict[str, Any] = {"action": (0.0, 0.0), "driver": "person"}
     steps = [

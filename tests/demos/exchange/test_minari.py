@@ -77,7 +77,6 @@ BOTH = [[0, 1, 2, 3], [4, 5, 6, 7]]
 
 
 def removed(name: str) -> Callable[[h5py.File], object]:
-    """Return a change that removes a column of the second episode."""
     return lambda file: file["episode_1"].__delitem__(name)
 
 

@@ -56,7 +56,6 @@ FORMAT = Format(
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Return a folder with an installed package of one file, and its entry point."""
     place = tmp_path / "site"
     about = place / "speeds_format-1.0.dist-info"
     about.mkdir(parents=True)

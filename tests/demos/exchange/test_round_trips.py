@@ -134,7 +134,6 @@ def test_many_episodes_keep_their_order(
 
 
 def test_a_tub_round_trips(tmp_path: Path) -> None:
-    """Actions, drivers, policy outputs, states, images and times are kept."""
     first: dict[str, Any] = {"action": (-0.5, 1.0), "wall_ns": _BEGUN}
     second: dict[str, Any] = {"action": (0.75, 0.0), "wall_ns": _BEGUN + 100 * _MS}
     steps = [

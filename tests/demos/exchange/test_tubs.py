@@ -91,8 +91,6 @@ def test_a_tub_of_version_1(tmp_path: Path) -> None:
 
 
 def lines(change: Callable[[list[bytes]], list[bytes]]) -> Callable[[Path], object]:
-    """Return a change of the lines of the first catalog."""
-
     def spoil(folder: Path) -> None:
         path = folder / "catalog_0.catalog"
         path.write_bytes(b"".join(change(path.read_bytes().splitlines(True))))
@@ -170,7 +168,6 @@ def test_the_rest_of_a_damaged_tub_is_imported(
 
 
 def test_catalogs_in_another_order(tmp_path: Path) -> None:
-    """Records are read in the order of their `_index`, which is reported."""
     folder = tub_folder(tmp_path / "tub", records(6))
     in_manifest('"catalog_0.catalog", "catalog_1.', '"catalog_1.catalog", "catalog_0.')(folder)
     in_manifest('"current_index": 6', '"current_index": 9')(folder)

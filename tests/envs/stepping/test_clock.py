@@ -16,7 +16,6 @@ from shapechanger.envs.stepping.tuned import PausedClock, paused_clock
 
 
 def measured(data: mujoco.MjData) -> float:
-    """Return the time that steps of the data have taken by MuJoCo's clock, s."""
     return float(data.timer.duration[int(mujoco.mjtTimer.mjTIMER_STEP)])
 
 

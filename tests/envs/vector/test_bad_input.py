@@ -25,7 +25,6 @@ from shapechanger.morphology import JointRange, Remove
 
 @pytest.fixture
 def ants() -> Iterator[ThreadVectorEnv]:
-    """Three ants in two threads, after a reset."""
     envs = shapechanger.make_vec("Ant", 3, threads=2)
     envs.reset(seed=0)
     yield envs
@@ -108,7 +107,6 @@ def test_bad_arguments_are_refused(env_id: str, arguments: dict[str, Any], sente
 
 
 def test_spaces_must_be_boxes() -> None:
-    """Other action spaces are refused."""
     with pytest.raises(VectorEnvError, match="action space of a vector env must be a Box"):
         ThreadVectorEnv([lambda: gym.make("CartPole-v1")])
 
@@ -183,7 +181,6 @@ def test_invalid_masks_are_refused(
 
 
 def test_wrong_numbers_of_seeds_and_values_are_refused(ants: ThreadVectorEnv) -> None:
-    """There must be one seed or value per env."""
     with pytest.raises(VectorEnvError, match="3 envs and 2 seeds"):
         ants.reset(seed=[1, 2])
     with pytest.raises(VectorEnvError, match="3 envs and 2 values"):
@@ -205,7 +202,6 @@ def test_invalid_seeds_are_refused(ants: ThreadVectorEnv, seed: Any) -> None:
 
 
 def test_reset_is_needed_first() -> None:
-    """Steps before the first reset raise, and so does a masked first reset."""
     envs = shapechanger.make_vec("Ant", 2)
     with pytest.raises(gym.error.ResetNeeded, match="call `reset` first"):
         envs.step(np.zeros((2, 8)))

@@ -31,7 +31,6 @@ def _break(env: Any) -> None:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", ["Ant", "Hopper", "Hopper-v5", "InvertedPendulum"])
 def test_other_envs_are_unaffected(name: str, mode: str, threads: int) -> None:
-    """When one env diverges, the results of the others do not change."""
     whole, broken = (
         ThreadVectorEnv(
             [partial(gym.make, name if "-" in name else f"shapechanger/{name}-v1")] * 3,
@@ -73,12 +72,10 @@ class _Uncertain(gym.Env[Any, Any]):
         self.reports = reports
 
     def reset(self, *, seed: Any = None, options: Any = None) -> Any:
-        """Start an episode."""
         self.steps = 0
         return np.zeros(2), {}
 
     def step(self, action: Any) -> Any:
-        """Return NaN in the second step."""
         self.steps += 1
         if self.steps != 2:
             return np.ones(2), 1.0, False, False, {}

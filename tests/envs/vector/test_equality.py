@@ -27,7 +27,6 @@ _QUICK = [
 
 
 def _pair(env_id: str, bodies: list[Any], threads: int, mode: str, **more: Any) -> tuple[Any, Any]:
-    """Return our vector env and Gymnasium's, with the same envs."""
     ours = shapechanger.make_vec(
         env_id, len(bodies), threads=threads, bodies=bodies, autoreset_mode=mode, **more
     )
@@ -59,7 +58,6 @@ def test_results_equal_gymnasiums(env_id: str, mode: str, threads: int) -> None:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("env_id", CATALOGUE)
 def test_results_of_every_env_equal_gymnasiums(env_id: str, mode: str) -> None:
-    """Every id agrees for 1,000 steps, with one and two threads."""
     for threads in (1, 2):
         assert _compare(env_id, threads, mode, steps=1000, clock=300) >= 18
 
@@ -99,8 +97,6 @@ def test_options_reach_every_env() -> None:
 
 
 def test_external_envs_are_stepped() -> None:
-    """Envs and wrappers of other packages are stepped by their own `step`."""
-
     def make() -> gym.Env[Any, Any]:
         env = gym.make("Hopper-v5", max_episode_steps=25)
         return gym.wrappers.TransformReward(env, lambda reward: 2.0 * reward)

@@ -25,7 +25,6 @@ from tests.envs.vector.sameness import require_same
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
 def test_gymnasium_makes_the_same_envs(env_id: str) -> None:
-    """`gym.make_vec` and our `make_vec` agree, and specs make the env again."""
     ours = shapechanger.make_vec(env_id, 2, threads=1)
     envs: list[Any] = [ours, gym.make_vec(env_id, num_envs=2, threads=1)]
     envs += [gym.make_vec(one.spec) for one in envs]
@@ -66,7 +65,6 @@ def test_a_spec_round_trips_through_json() -> None:
 
 
 def test_each_env_may_have_a_body_of_its_own() -> None:
-    """Bodies are given as names, edits and JSON."""
     bodies = [
         "Ant",
         "BigAnt",
@@ -117,7 +115,6 @@ def test_observations_are_copies_if_asked_for(copy: bool) -> None:
 
 
 def test_gymnasiums_vector_wrappers_work() -> None:
-    """RecordEpisodeStatistics and NormalizeReward work."""
     envs: Any = shapechanger.make_vec(
         "InvertedPendulum", 2, max_episode_steps=4, autoreset_mode="SameStep"
     )

@@ -35,20 +35,16 @@ class _Plain(gym.Env[Any, Any]):
         self.threads: list[int] = []
 
     def reset(self, *, seed: Any = None, options: Any = None) -> Any:
-        """Record the thread."""
         self.threads.append(threading.get_ident())
         return np.zeros(1), {}
 
     def render(self) -> Any:
-        """Record the thread."""
         self.threads.append(threading.get_ident())
 
     def close(self) -> None:
-        """Record the thread."""
         self.threads.append(threading.get_ident())
 
     def step(self, action: Any) -> Any:
-        """Count the step, or raise."""
         self.thread = threading.get_ident()
         if self.raises is not None:
             raise self.raises

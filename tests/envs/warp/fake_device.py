@@ -73,7 +73,6 @@ class FakeDevice(TorchFunctionMode):
         self.forget()
 
     def forget(self) -> None:
-        """Start counting from zero."""
         self.syncs: Counter[str] = Counter()
         self.copies: Counter[str] = Counter()
         self.mixed: Counter[str] = Counter()

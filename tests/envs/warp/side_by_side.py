@@ -48,7 +48,6 @@ HUMANOID_ON_A_GPU = 5e-4
 
 
 def tolerance(worlds: WarpVectorEnv) -> float:
-    """Return the tolerance of observations after a step."""
     on_a_gpu = not worlds.device.startswith("cpu")
     is_humanoid = worlds.made_from is not None and "Humanoid" in worlds.made_from.id
     return HUMANOID_ON_A_GPU if on_a_gpu and is_humanoid else OBSERVATION_TOLERANCE
@@ -115,5 +114,4 @@ def apart(found: Any, expected: Any) -> float:
 
 
 def names_of(infos: dict[str, Any]) -> set[str]:
-    """Return the names of the infos of the task."""
     return {name for name in infos if not name.startswith("_")} - ALWAYS

@@ -18,7 +18,6 @@ from shapechanger.errors import BadAction, MissingExtra, UnknownName, VectorEnvE
 
 @pytest.fixture(scope="module")
 def pendulums() -> WarpVectorEnv:
-    """Two pendulums after a reset."""
     envs = shapechanger.make_vec("InvertedPendulum", 2, backend="warp", device="cpu")
     envs.reset(seed=0)
     return envs

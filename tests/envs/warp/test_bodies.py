@@ -37,7 +37,6 @@ LONG = [Stretch("shank_*", 1.7), Mass("torso", 1.2), Friction("floor", 0.5)]
 
 @pytest.fixture(scope="module")
 def ants() -> Iterator[WarpVectorEnv]:
-    """Three plain ants."""
     envs = shapechanger.make_vec("Ant", 3, backend="warp", device="cpu")
     yield envs
     envs.close()
@@ -50,7 +49,6 @@ def model_rows(envs: WarpVectorEnv, name: str) -> Any:
 
 
 def test_worlds_step_with_the_bodies_of_the_last_reset(ants: WarpVectorEnv) -> None:
-    """After a reset with bodies, each world steps as the CPU env of its body."""
     bodies: list[Any] = [LONG, "AmputatedAnt", [Gravity((0.0, 0.0, -4.0))]]
     ants.reset(seed=1, options={"bodies": bodies})
     alone: list[Any] = [gym.make("shapechanger/Ant-v1", body=body).unwrapped for body in bodies]
@@ -217,7 +215,6 @@ def test_a_pool_of_several_shapes_draws_within_each() -> None:
 
 @pytest.mark.parametrize("limit", ["njmax", "nconmax"])
 def test_too_little_memory_for_contacts_or_constraints_gives_a_warning(limit: str) -> None:
-    """A warning is given if an argument makes the memory too small."""
     arguments: Any = {limit: 1}
     envs = shapechanger.make_vec("Ant", 2, backend="warp", device="cpu", **arguments)
     envs.reset(seed=0)

@@ -69,7 +69,6 @@ def test_ends_and_divergence_are_always_in_the_infos(task_infos: bool) -> None:
 
 
 def test_worlds_have_the_time_limit_of_the_id() -> None:
-    """An episode is truncated after `max_episode_steps` of the spec, counted from its start."""
     assert pendulums().max_episode_steps == 1000
     envs = pendulums(max_episode_steps=3)
     ends = [envs.step(torch.zeros(WORLDS, 1))[3].all() for _ in range(8)]
@@ -96,7 +95,6 @@ def test_a_seed_gives_the_same_world_anywhere() -> None:
 
 
 def test_worlds_without_seeds_differ() -> None:
-    """Without a seed each world of each vector env draws its own."""
     one, other = (
         shapechanger.make_vec("InvertedPendulum", 2, backend="warp", device="cpu").reset()[0]
         for _ in range(2)

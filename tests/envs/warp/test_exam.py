@@ -27,7 +27,6 @@ ROUNDS = 3
 
 @pytest.fixture(scope="module", params=BODIES)
 def pair(request: pytest.FixtureRequest) -> Iterator[tuple[WarpVectorEnv, list[Any]]]:
-    """Worlds with the bodies of a family, and the CPU env of each."""
     worlds, alone = many(request.param)
     for env in alone:
         env.reset(seed=0)

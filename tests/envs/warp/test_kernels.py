@@ -75,7 +75,6 @@ def test_moment_arms_are_still_kept_once() -> None:
 
 
 def test_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kernels written for one version of mujoco-warp are not used with another."""
     monkeypatch.setattr(kernels, "version", lambda name: "4.1.0")
     with pytest.raises(VectorEnvError, match=r"mujoco-warp 4\.0\.x, and 4\.1\.0 is installed"):
         kernels.follow_mujoco()

@@ -129,7 +129,6 @@ _WRITTEN_OUT = """
 
 
 def test_children_move_along_with_a_stretch() -> None:
-    """A stretch moves the anchors of child bodies, and the positions of sites and other joints."""
     model = built(leg(), Stretch("thigh", 2.0))
     np.testing.assert_allclose(model.site("scar").pos, [0.0, 0.0, -0.12])
     # The knee, 5 cm below the shin's origin, stays at the end of the thigh.

@@ -249,7 +249,6 @@ def test_a_flex_is_not_torn(edit: Edit) -> None:
 
 
 def test_removed_elements_are_removed_from_tuples() -> None:
-    """The tuple keeps its other elements."""
     text = """<custom><tuple name="both"><element objtype="body" objname="lower" prm="1"/>
       <element objtype="body" objname="other" prm="2"/></tuple></custom>"""
     model = built(arm(text), Remove("lower"))
@@ -356,7 +355,6 @@ def test_a_trunk_on_a_slide_starts_at_the_height() -> None:
 
 
 def test_a_keyframe_keeps_its_mocap_bodies() -> None:
-    """A mocap body keeps the pose of the keyframe."""
     spec = arm('<keyframe><key mpos="1 2 3"/></keyframe>')
     spec.worldbody.add_body(name="hand", mocap=True, pos=[0.0, 0.0, 2.0])
     model = built(spec, Mass("lower", scale=2.0))

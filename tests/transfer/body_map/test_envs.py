@@ -72,7 +72,6 @@ def test_a_mapped_env_adapts_observations_and_actions() -> None:
 
 
 def test_a_space_of_the_wrong_size_is_refused() -> None:
-    """Observations or actions of another size than the map's are refused when the env is built."""
     built = body_map(Recorder(), Recorder(feet=True))
     with pytest.raises(SpaceMismatch, match=r"target observation has 59 numbers"):
         MappedEnv(Recorder(), built)

@@ -38,7 +38,6 @@ def small() -> BodyMap:
 
 
 def test_values_are_reordered_by_name() -> None:
-    """Observations are in the order of the source, actions in the target's."""
     np.testing.assert_array_equal(small().adapt_observation([7.0, 3.0]), [3.0, 0.0, 0.25])
     np.testing.assert_array_equal(small().adapt_action([0.4, 0.3]), [0.3, -0.6, 0.0, 0.2])
 
@@ -135,7 +134,6 @@ def test_entries_are_equal_if_they_do_the_same() -> None:
 
 
 def test_a_map_can_be_pickled() -> None:
-    """A pickled and a copied map equal the original, and have the same arrays."""
     built = small()
     assert built.action_matrix.shape == (4, 2)
     for twin in (pickle.loads(pickle.dumps(built)), copy.deepcopy(built)):

@@ -206,7 +206,6 @@ def _learner(**changed: Any) -> LimbLearner:
 
 @pytest.fixture(scope="module")
 def policy() -> TrainedPolicy:
-    """A policy that has hardly learned."""
     return _learner().train(FEW, 32, 0)
 
 
@@ -281,7 +280,6 @@ def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
 
 
 def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The generalist is evaluated before the first target step, and then learns there."""
     monkeypatch.setattr(basic, "BODIES", 4)
     short = {"max_episode_steps": 20}
     task = TransferTask(ANT.having(short), EXTENDED.having(short))
@@ -311,7 +309,6 @@ def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_onnx_of_a_body_equals_pytorch(tmp_path: Path) -> None:
-    """The exported policy maps observations of the body to its actions."""
     trained = _learner(network="padded", room=12, net_arch=(8, 8)).train(FEW, 32, 0)
     with EXTENDED.make() as env:
         export_limbs(trained, env, EXTENDED, tmp_path / "ant.onnx")

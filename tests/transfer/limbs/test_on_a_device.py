@@ -134,7 +134,6 @@ def _worlds(bodies: list[str]) -> RslVecEnv:
 
 @pytest.fixture(scope="module")
 def policy() -> TrainedPolicy:
-    """A policy of two ants that has hardly learned."""
     return _learner().train(BOTH, 48, 0)
 
 

@@ -66,8 +66,6 @@ def test_a_name_that_does_not_exist(no_other: dict[str, type[Method]]) -> None:
 
 
 def test_names_are_taken_once(no_other: dict[str, type[Method]]) -> None:
-    """A second method of one name is refused; the same class again is not."""
-
     def named(name: str) -> type[Method]:
         return type(f"Named{name}", (Method,), {"name": name})
 
@@ -330,7 +328,6 @@ def test_each_seed_has_another_target(gap: tuple[Study, Path, list[Any]]) -> Non
 
 
 def test_adapted_sources_are_saved(gap: tuple[Study, Path, list[Any]]) -> None:
-    """The adapted envs are in the folders of the runs, with their policies."""
     made, out, _ = gap
     sources = {
         kind: json.loads((Run(kind, 0).folder(out) / "source.json").read_text())

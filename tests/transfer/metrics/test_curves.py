@@ -77,7 +77,6 @@ def test_curves_are_read_only_copies() -> None:
 
 
 def test_curves_are_straight_between_evaluations_and_hold_their_end() -> None:
-    """Values are linear between evaluations and constant after the last."""
     np.testing.assert_allclose(RISING.at([25.0, 100.0, 400.0]), [[0.25, 1, 1], [0.75, 0, 0]])
     np.testing.assert_allclose(RISING.at(25.0), [[0.25], [0.75]])
     # Areas are trapezoids: (0 + 4)/2 · 10 + (4 + 2)/2 · 30 = 110, divided by 40 steps.

@@ -35,7 +35,6 @@ def ratio(
 
 
 def test_welch_agrees_with_scipy() -> None:
-    """The interval equals scipy's."""
     ours = estimate_difference(ARM, SCRATCH)
     theirs = stats.ttest_ind(ARM, SCRATCH, equal_var=False).confidence_interval(0.95)
     assert ours.method == "Welch's t"

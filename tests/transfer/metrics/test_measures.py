@@ -223,7 +223,6 @@ def test_headroom_is_needed(height: float, is_defined: bool) -> None:
 
 @pytest.mark.parametrize("outside", [-0.1, 1.1])
 def test_scores_must_be_clipped(outside: float) -> None:
-    """Values outside [0, 1] are refused."""
     wild = curves((0.0, 0.5, outside))
     for arm, scratch in (
         (wild, WORSE),

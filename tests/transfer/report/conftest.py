@@ -17,5 +17,4 @@ def study() -> Study:
 
 @pytest.fixture(scope="session")
 def page(study: Study) -> str:
-    """The report of the study."""
     return study_html(study, picture_note="No image can be drawn here.")

@@ -231,7 +231,6 @@ def pairs() -> Mapping[str, Study]:
 
 @pytest.fixture(scope="module")
 def suite_page(pairs: Mapping[str, Study]) -> str:
-    """The page of all six pairs."""
     return suite_html("poles", pairs, seeds=5)
 
 

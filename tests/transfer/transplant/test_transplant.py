@@ -243,7 +243,6 @@ def test_the_identity_changes_no_bit(kind: type[Any]) -> None:
 
 
 def test_each_weight_goes_to_its_name() -> None:
-    """Each column of a linear policy moves to the feature of the same name."""
     observation = Layout(tuple(Feature(name, "1") for name in ("a", "b", "c")))
     seen = Layout(tuple(Feature(name, "1") for name in ("c", "new", "a", "b")))
     body_map = BodyMap.between(
@@ -473,7 +472,6 @@ def test_rewards_alone_may_be_normalised() -> None:
 
 
 def test_settings_are_kept_or_changed() -> None:
-    """The new model has the source's settings except those given."""
     body_map = MAPS["growth"]
     env = targets(body_map)
     ppo = trained(PPO, body_map, gamma=0.9, clip_range=0.3, target_kl=0.5, learning_rate=1e-4)
@@ -598,7 +596,6 @@ class Own(FlattenExtractor):
     ],
 )
 def test_other_policies_are_refused(make: Callable[[BodyMap], Any], message: str) -> None:
-    """The message names the policy and what is supported."""
     body_map = MAPS["identity"]
     with pytest.raises(TransplantError, match=message) as caught:
         transplant(make(body_map), body_map, targets(body_map))

@@ -40,7 +40,6 @@ class Ground:
     def drive(
         self, seconds: float, outputs: Mapping[str, float | None], battery_v: float | None = None
     ) -> None:
-        """Simulate with constant outputs."""
         volts = BATTERY_V if battery_v is None else battery_v
         for _ in range(round(seconds / self.model.opt.timestep)):
             self.vehicle.drive(outputs, volts)

@@ -154,7 +154,6 @@ def test_a_body_is_within_its_declared_size(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_visual_geoms_change_no_physics(name: str) -> None:
-    """Masses, inertias and collision geoms are the same without visual geoms."""
     full, bare = mujoco.MjSpec(), mujoco.MjSpec()
     for spec in (full, bare):
         add_vehicle(spec, name)

@@ -151,7 +151,6 @@ class _Bench:
         self.touch = ContactTracker(self.model)
 
     def stand(self, x: float, seconds: float = _DT, heading: float = 0.0) -> None:
-        """Stay at x for some seconds."""
         self.data.qpos[:3] = x, 0.0, 0.1
         mujoco.mj_forward(self.model, self.data)
         for _ in range(round(seconds / _DT)):
@@ -159,7 +158,6 @@ class _Bench:
 
 
 def test_contacts_within_half_a_second_are_one_collision() -> None:
-    """A later contact is another collision."""
     bench = _Bench()
     bench.stand(0.91, seconds=3.0)
     assert bench.touch.touches

@@ -75,7 +75,6 @@ def test_an_unclosed_camera_is_garbage_collected() -> None:
 
 
 def test_rendering_after_a_fork_raises(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A process forked after rendering raises an error instead of deadlocking."""
     monkeypatch.setattr(module, "_drawing", {os.getpid() + 1})
     camera = OnboardCamera((32, 16), "eye")
     model, data = _model("1 0 0")

@@ -101,7 +101,6 @@ def test_boats_are_moored_behind_quays(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", _SEEDS)
 def test_obstacles_are_drawn_at_their_place(seed: int) -> None:
-    """The drawn extent of an obstacle equals its size."""
     course = lay_out("harbour", seed)
     for obstacle in course.obstacles:
         alone = replace(course, obstacles=(obstacle,))

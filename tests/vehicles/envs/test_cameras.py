@@ -27,7 +27,6 @@ _OTHERS = [
 
 
 def _profile(folder: Path, camera: CameraPlan, vehicle: str = "car") -> Path:
-    """Write the profile of a vehicle with another camera."""
     path = folder / f"{vehicle}.toml"
     stated = {
         "size": f"size = {list(camera.size)}",
@@ -43,7 +42,6 @@ _AT = {"options": {"course": 11, "start": 11}}
 
 
 def _seen(by: str, folder: Path, camera: CameraPlan) -> NDArray[np.uint8]:
-    """Return the warped image of an env or a twin with a camera."""
     profile = _profile(folder, camera)
     if by.startswith("waypoints"):
         with closing(WaypointEnv("car", robot=profile, sensed="sensed" in by)) as env:
@@ -86,8 +84,6 @@ def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path, sensed: bool) 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_pictures_do_not_depend_on_threads() -> None:
-    """Pictures of two threads equal one thread's."""
-
     def pictures(threads: int) -> list[Any]:
         options: dict[str, Any] = {"size": (48, 32), "render_mode": "rgb_array"}
         envs = shapechanger.make_vec(

@@ -112,7 +112,6 @@ def test_bang_steering_turns_half_into_full_steering() -> None:
 
 
 def test_invalid_steps_are_refused() -> None:
-    """Steps before a reset and invalid actions raise errors."""
     with closing(_car()) as env:
         with pytest.raises(gym.error.ResetNeeded, match="reset"):
             env.step(_AHEAD)
@@ -219,7 +218,6 @@ def test_courses_are_drawn_from_their_seeds(courses: Any, held_out: bool, seeds:
 
 
 def test_options_do_not_change_other_draws() -> None:
-    """A given course or start leaves the other random choices unchanged."""
     with closing(RangesEnv("car", randomise=True)) as env:
 
         def drawn(**options: int) -> tuple[int, Any, Any]:

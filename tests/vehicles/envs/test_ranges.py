@@ -19,7 +19,6 @@ _STEPS = 60
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_the_fast_env_matches_the_full_robot(vehicle: str) -> None:
-    """Equal actions lead to nearly equal poses."""
     with closing(VehicleEnv(vehicle, image=False)) as robot, closing(RangesEnv(vehicle)) as fast:
         robot.reset(options=_COURSE)
         fast.reset(options=_COURSE)
@@ -75,7 +74,6 @@ def test_the_pause_after_a_collision_matches_the_full_robot() -> None:
 
 
 def test_outputs_follow_the_guards_limits() -> None:
-    """Outputs are limited by the guard's caps, slew and stop after a bump."""
     plan = GuardPlan(
         "test",
         (ActionPlan("throttle", high=0.5, slew_per_s=4.0, propels=True),),

@@ -141,7 +141,6 @@ def test_properties_of_a_path(vehicle: str, seed: int) -> None:
 
 
 def _plug(course: Course, size: float) -> Course:
-    """Return the course with a box of this size in the middle of its lane."""
     x, y = course.route[100]
     ahead = course.route[101] - course.route[99]
     yaw = float(np.arctan2(ahead[1], ahead[0]))
@@ -168,7 +167,6 @@ def test_a_boat_passes_narrow_flooded_corridors(seed: int) -> None:
 
 
 def test_distances_are_exact() -> None:
-    """Distances from walls, rotated boxes and cylinders are exact, and 0 inside."""
     box = Obstacle("box", 1.0, 1.0, np.pi / 4, 0.4, 0.2, 0.3)
     post = Obstacle("post", 3.0, 0.0, 0.0, 0.4, 0.4, 0.3)
     empty = ring(0, obstacles=0, radius=50.0)
@@ -186,7 +184,6 @@ def test_distances_are_exact() -> None:
 
 
 def _progress_m(env: RangesEnv, seconds: float) -> float:
-    """Let the expert drive for a time, and return the net progress, m."""
     expert, info = env.expert(), dict[str, Any]()
     for _ in range(round(seconds * 20)):
         *_, info = env.step(expert(None))
