@@ -132,9 +132,20 @@ def every(change: Any) -> Any:
         ({"places": lambda entries: entries[:1]}, [0], "episode 1: meta/episodes does not have it"),
         ({"places": lambda entries: entries[1:]}, [1], "episode 0: meta/episodes does not have it"),
         ({"rows": lambda rows: rows[:8]}, [0], "have 0 of the 8 rows of episode 1"),
+        # Contradictions that change no step.
+        (
+            {"info": {"total_episodes": 3}},
+            [0, 1],
+            r"warning: .*\(3, 16\) .*, and meta/episodes \(2, 16\)",
+        ),
+        (
+            {"pictures": range(18)},
+            [0, 1],
+            r"warning: .*more images: .* shows 0 to 0\.9 s where",
+        ),
     ],
 )
-def test_contradictions_are_left_out(
+def test_contradictions_are_reported_and_what_they_change_is_left_out(
     tmp_path: Path, options: dict[str, Any], episodes: list[int], reason: str
 ) -> None:
     """An episode whose keys or times disagree is not imported, and the report states the reason."""
