@@ -205,10 +205,10 @@ def unbacked(text: str, files: str, name: str) -> list[str]:
 def spelled(cell: str, files: str) -> str:
     """Return a cell as the names of rows spell it."""
     cell = cell.removeprefix("in the ").strip("* ")
-    words = [SPELLED.get(word, word) for word in cell.split(" → ")]
+    names = [SPELLED.get(word, word) for word in cell.split(" → ")]
     if "waypoint-studies" in files:
-        words = [f"{word.title()}Waypoint" for word in words]
-    return "-to-".join(words)
+        names = [f"{word.title()}Waypoint" for word in names]
+    return "-to-".join(names)
 
 
 def lines(name: str, header: str) -> Iterator[tuple[str, str, str]]:

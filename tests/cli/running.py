@@ -23,23 +23,23 @@ class Cli:
         self._capsys = capsys
         self._group = group
 
-    def ended(self, code: int, *words: object) -> Printed:
+    def ended(self, code: int, *arguments: object) -> Printed:
         self._capsys.readouterr()
         found: object = 0
         try:
-            main([*self._group, *map(str, words)])
+            main([*self._group, *map(str, arguments)])
         except SystemExit as stop:
             found = stop.code or 0
         printed = Printed(*self._capsys.readouterr())
         assert found == code, printed
         return printed
 
-    def output(self, *words: object) -> str:
-        return self.ended(0, *words).out
+    def output(self, *arguments: object) -> str:
+        return self.ended(0, *arguments).out
 
-    def refused(self, *words: object) -> str:
+    def refused(self, *arguments: object) -> str:
         """Return the error of a command that must end with exit code 2; it must be one sentence."""
-        message = self.ended(2, *words).err
+        message = self.ended(2, *arguments).err
         assert message.startswith("error: ")
         assert message.count("\n") == 1, message
         return message

@@ -51,7 +51,7 @@ def test_ascii_output_replaces_missing_letters() -> None:
 @pytest.mark.system
 @pytest.mark.skipif(sys.platform != "linux", reason="Other systems always have a display.")
 @pytest.mark.parametrize(
-    ("arguments", "variables", "words"),
+    ("arguments", "variables", "message"),
     [
         (["envs", "Ant"], {"MUJOCO_GL": "nonsense"}, "one of egl, osmesa, glfw"),
         (RENDER, {"MUJOCO_GL": "disable"}, "cannot render with MUJOCO_GL=disable: set it to one"),
@@ -61,7 +61,7 @@ def test_ascii_output_replaces_missing_letters() -> None:
 def test_rendering_failures_give_one_sentence(
     arguments: list[str],
     variables: dict[str, str],
-    words: str,
+    message: str,
     tmp_path: os.PathLike[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -70,7 +70,7 @@ def test_rendering_failures_give_one_sentence(
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1
-    assert words in done.stderr
+    assert message in done.stderr
     assert not os.listdir(tmp_path)
 
 
@@ -101,7 +101,7 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
 
 
 @pytest.mark.parametrize(
-    ("command", "words"),
+    ("command", "message"),
     [
         ("train Ant --learner ppo-rum", "Did you mean 'ppo-run'?"),
         ("train Ant --steps 10", "A budget of 10 steps is too small"),
@@ -148,11 +148,11 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
     ],
 )
 def test_mistakes_give_one_sentence(
-    command: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
+    command: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
-    assert words in " ".join(cli.refused(*shlex.split(command)).split())
+    assert message in " ".join(cli.refused(*shlex.split(command)).split())
     assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["file"]
 
 

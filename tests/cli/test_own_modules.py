@@ -50,7 +50,7 @@ SUITE = "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\
 
 
 @pytest.mark.parametrize(
-    ("module", "content", "arguments", "words"),
+    ("module", "content", "arguments", "message"),
     [
         (
             "my_learner",
@@ -69,11 +69,11 @@ SUITE = "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\
     ],
 )
 def test_a_module_of_the_current_folder_is_found(
-    module: str, content: str, arguments: list[str], words: str, folder: Path, cli: Cli
+    module: str, content: str, arguments: list[str], message: str, folder: Path, cli: Cli
 ) -> None:
     (folder / f"{module}.py").write_text(content)
     (folder / "mine.toml").write_text(SUITE)
-    assert words in cli.refused(*arguments)
+    assert message in cli.refused(*arguments)
 
 
 def test_names_of_shipped_learners_do_not_change_the_path(folder: Path, cli: Cli) -> None:
@@ -114,7 +114,7 @@ def test_a_policy_is_evaluated_in_its_robot_until_the_robot_changes(
     evaluate = ("policies", "evaluate", _POLICY, "--episodes", "1")
     assert "return" in cli.output(*evaluate)
     assert "cliown_task.py" in cli.output("policies", "show", _POLICY)
-    for file, content, words in (
+    for file, content, message in (
         ("b.xml", XML.format(0.5), "its model has changed from"),
         ("cliown_goal.py", "HEIGHT = 0.7\n", "cliown_goal.py has changed from"),
     ):
@@ -122,7 +122,7 @@ def test_a_policy_is_evaluated_in_its_robot_until_the_robot_changes(
         (project / file).write_text(content)
         for command in (("policies", "evaluate", _POLICY), ("play", _POLICY, "--out", "film.mp4")):
             told = " ".join(cli.refused(*command).split())
-            assert words in told
+            assert message in told
             assert "or name the env, to try the policy" in told
         cli.output(*evaluate, "--env", "b.xml@cliown_task:Hold")
         (project / file).write_text(was)

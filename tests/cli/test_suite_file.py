@@ -34,7 +34,7 @@ def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("seeds = 3\nsed = 4\n", "line 2: No key of a suite matches 'sed'. Did you mean 'seed'?"),
         (
@@ -66,12 +66,12 @@ def test_the_shipped_suites_have_the_studies_of_the_docs() -> None:
     ],
 )
 def test_a_mistake_in_a_file_gives_one_sentence(
-    text: str, words: str, tmp_path: Path, cli: Cli
+    text: str, message: str, tmp_path: Path, cli: Cli
 ) -> None:
     """The sentence has the line, alternatives and the nearest spelling; no study is run."""
     file = tmp_path / "mine.toml"
     file.write_text(text)
-    assert words in cli.refused("suite", "run", file, "--out", tmp_path / "out")
+    assert message in cli.refused("suite", "run", file, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
     assert "Did you mean 'vehicles'?" in cli.refused("suite", "run", "vehicle")
 

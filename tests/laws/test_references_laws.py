@@ -325,9 +325,9 @@ def _path(model: mujoco.MjModel, tendon: str) -> list[str]:
 def _target(model: mujoco.MjModel, actuator: str) -> list[str]:
     of = model.actuator(actuator)
     kind = mujoco.mjtTrn(int(of.trntype[0]))
-    words = {mujoco.mjtTrn.mjTRN_JOINT: "joint", mujoco.mjtTrn.mjTRN_TENDON: "tendon"}
-    ids = [int(i) for i in of.trnid if i >= 0][: 1 if kind in words else 2]
-    return [getattr(model, words.get(kind, "site"))(i).name for i in ids]
+    kinds = {mujoco.mjtTrn.mjTRN_JOINT: "joint", mujoco.mjtTrn.mjTRN_TENDON: "tendon"}
+    ids = [int(i) for i in of.trnid if i >= 0][: 1 if kind in kinds else 2]
+    return [getattr(model, kinds.get(kind, "site"))(i).name for i in ids]
 
 
 def _sensed(model: mujoco.MjModel, sensor: str) -> list[str]:

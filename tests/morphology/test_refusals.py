@@ -35,13 +35,13 @@ def test_every_refusal_has_its_rule() -> None:
     """Exactly one row of the page quotes words of each message in the code."""
     rules = _rules()
     for sentence in {*_raised()}:
-        found = [words for words in rules if any(each in sentence for each in words)]
+        found = [phrases for phrases in rules if any(each in sentence for each in phrases)]
         assert len(found) == 1, sentence
 
 
 def test_every_rule_has_its_refusal() -> None:
     """All words that the page quotes are in a message, and the page is shorter than 30 lines."""
     sentences = {*_raised()}
-    for each in (words for rule in _rules() for words in rule):
+    for each in (phrases for rule in _rules() for phrases in rule):
         assert any(each in sentence for sentence in sentences), each
     assert len(_PAGE.read_text(encoding="utf-8").splitlines()) < 30

@@ -223,7 +223,7 @@ def test_an_expert_corrects_a_policy(tmp_path: Path, demos: Cli) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (["Ant"], "has no expert"),
         (["Car", "--minutes", "0"], "--minutes must be above 0"),
@@ -237,14 +237,14 @@ def test_an_expert_corrects_a_policy(tmp_path: Path, demos: Cli) -> None:
 )
 def test_invalid_arguments_give_one_sentence(
     arguments: list[str],
-    words: str,
+    message: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     demos: Cli,
     gl: None,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert words in demos.refused("record", *arguments, "--out", "data")
+    assert message in demos.refused("record", *arguments, "--out", "data")
     assert not Path("data").exists()
 
 

@@ -363,7 +363,7 @@ HOSTILE = (
 
 
 @pytest.mark.parametrize(
-    ("make", "spoil", "words", "command"),
+    ("make", "spoil", "message", "command"),
     [
         pytest.param(make, *spoilt, command, id=f"{command[0]}: {name}")
         for make, all_spoilt, command in HOSTILE
@@ -375,7 +375,7 @@ def test_a_hostile_recording_is_refused(
     jail: Jail,
     make: Callable[[Path], Path],
     spoil: Callable[[Path], object],
-    words: str,
+    message: str,
     command: tuple[str, ...],
 ) -> None:
     """The error is one sentence, and no file is written; `show` prints no traceback."""
@@ -383,6 +383,6 @@ def test_a_hostile_recording_is_refused(
     folder = tmp_path / "data-v0"
     spoil(make(folder))
     name, option, out, *more = command
-    assert words in refuse(jail(name, folder, option, tmp_path / out, *more))
+    assert message in refuse(jail(name, folder, option, tmp_path / out, *more))
     assert not (tmp_path / out).exists()
     assert "Traceback" not in jail("show", folder)[1]

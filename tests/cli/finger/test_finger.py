@@ -23,8 +23,8 @@ from tests.finger.identify.logs import recorded
 
 def test_a_finger_is_recorded(tmp_path: Path, finger: Cli) -> None:
     out = tmp_path / "new" / "log.npz"
-    words = ("--seconds", 2.4, "--seed", 4, "--gap", "real-like", "--finger-seed", 3)
-    printed = finger.output("record", "Finger", "--out", out, *words, "--actions", "tension")
+    arguments = ("--seconds", 2.4, "--seed", 4, "--gap", "real-like", "--finger-seed", 3)
+    printed = finger.output("record", "Finger", "--out", out, *arguments, "--actions", "tension")
     assert "wrote 121 rows, 2.4 s" in printed
     log = load_log(out)
     assert (log.actions, log.source) == ("tension", "shapechanger/Finger-v1")
@@ -65,8 +65,10 @@ def test_geared_motors_can_be_assumed_if_the_log_does_not_describe_them(
         raise FingerError("That is enough.")
 
     monkeypatch.setattr("shapechanger.cli.finger.identify", identify)
-    for words in (("log.npz",), ("log.npz", "--geared"), ("own.npz", "--geared")):
-        assert "That is enough." in finger.refused("identify", tmp_path / words[0], *words[1:])
+    for arguments in (("log.npz",), ("log.npz", "--geared"), ("own.npz", "--geared")):
+        assert "That is enough." in finger.refused(
+            "identify", tmp_path / arguments[0], *arguments[1:]
+        )
     assert taken == [None, shipped_rig(), own]
 
 
@@ -92,8 +94,8 @@ def test_a_finger_is_exported(tmp_path: Path, finger: Cli) -> None:
     file.write_text(drawn.to_json())
     texts = []
     gap, named = ("--gap", "real-like", "--finger-seed", 3), ("--parameters", "an-1983")
-    for words in (gap, ("--parameters", file), (), named):
-        assert f"wrote {out}" in finger.output("export", "--out", out, *words)
+    for arguments in (gap, ("--parameters", file), (), named):
+        assert f"wrote {out}" in finger.output("export", "--out", out, *arguments)
         texts.append(out.read_text())
     drive = drive_of("impedance", NOMINAL)
     assert texts[0] == texts[1] == finger_mjcf(drawn, drive)

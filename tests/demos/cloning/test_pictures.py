@@ -48,7 +48,7 @@ def test_prepared_images_are_returned_unchanged() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pictures", "words"),
+    ("pictures", "message"),
     [
         (_pictures(1, 0, 40), r"shape \(1, 0, 40, 3\)"),
         (_pictures(1)[0], r"shape \(120, 160, 3\)"),
@@ -56,8 +56,8 @@ def test_prepared_images_are_returned_unchanged() -> None:
         (_pictures(1).astype(np.float32), "float32"),
     ],
 )
-def test_invalid_images_are_refused(pictures: np.ndarray, words: str) -> None:
-    with pytest.raises(DemosError, match=words):
+def test_invalid_images_are_refused(pictures: np.ndarray, message: str) -> None:
+    with pytest.raises(DemosError, match=message):
         prepare(pictures, _FRAMING)
 
 

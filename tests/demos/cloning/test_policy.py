@@ -159,7 +159,7 @@ _COMPILED = _model("EPContext", "com.microsoft", ep_cache_context="x", source=_P
 
 
 @pytest.mark.parametrize(
-    ("content", "words"),
+    ("content", "message"),
     [
         (b"\x08\x08garbage", "protobuf parsing failed"),
         (_model(), "no card of Shapechanger"),
@@ -170,10 +170,10 @@ _COMPILED = _model("EPContext", "com.microsoft", ep_cache_context="x", source=_P
         (_COMPILED, "not compatible with any execution provider"),
     ],
 )
-def test_other_onnx_files_are_refused(content: bytes, words: str, tmp_path: Path) -> None:
+def test_other_onnx_files_are_refused(content: bytes, message: str, tmp_path: Path) -> None:
     file = tmp_path / "policy.onnx"
     file.write_bytes(content)
     with pytest.raises(PolicyError, match="is not a policy that") as refusal:
         load_policy(file)
-    assert words in str(refusal.value)
+    assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)

@@ -50,7 +50,7 @@ class Reader(HTMLParser):
         self.feed(page)
         self.close()
         assert self._open == []
-        self.words = " ".join(" ".join(self._pieces).split())
+        self.text = " ".join(" ".join(self._pieces).split())
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
@@ -82,17 +82,17 @@ def test_the_page_is_self_contained(page: str) -> None:
 
 def test_numbers_match_the_table(study: Study, page: str) -> None:
     read = Reader(page)
-    assert verdict(study) in read.words
+    assert verdict(study) in read.text
     for row in measure_rows(study):
-        assert row.note in read.words
+        assert row.note in read.text
         cells = (row.measure, row.target, row.total, row.unit, row.method)
-        assert (" ".join(cells) in read.words) == (row.target != "undefined")
+        assert (" ".join(cells) in read.text) == (row.target != "undefined")
 
 
 def test_methods_map_and_provenance_are_stated(page: str) -> None:
     """Matched entries of the body map are counted and folded, and others are listed."""
     read = Reader(page)
-    for words in (
+    for text in (
         "over training seeds, never over episodes",
         "Welch",
         "Taylor & Stone, JMLR 10, 2009",
@@ -117,7 +117,7 @@ def test_methods_map_and_provenance_are_stated(page: str) -> None:
         "5 trained by the study, one for each seed",
         "scratch 440.3 440.3 zero-shot 200 200",
     ):
-        assert words in read.words
+        assert text in read.text
     assert read.tags.count("details") == 3
 
 
@@ -132,12 +132,12 @@ def test_names_are_escaped() -> None:
     read = Reader(page)
     assert "<script" not in page
     assert "script" not in read.tags
-    assert read.words.count("alert(1)") >= 13
+    assert read.text.count("alert(1)") >= 13
     assert read.headings[0].endswith(f", {EVIL * 9} → BigAnt")
 
 
 @pytest.mark.parametrize(
-    ("study", "words"),
+    ("study", "text"),
     [
         (make_study(given=True), "given, SHA-256 abababab"),
         (make_study(arms=("scratch", "zero-shot")), "Zero-shot against scratch"),
@@ -148,12 +148,12 @@ def test_names_are_escaped() -> None:
         (make_study(command=""), "called from Python"),
     ],
 )
-def test_missing_parts_are_stated(study: Study, words: str) -> None:
+def test_missing_parts_are_stated(study: Study, text: str) -> None:
     """The page states what is missing, and never shows nan, inf or None."""
     read = Reader(study_html(study))
-    assert words in read.words
-    assert "Reward terms" not in read.words
-    assert re.search(r"\b(nan|inf|None|undefined \[)\b", read.words) is None
+    assert text in read.text
+    assert "Reward terms" not in read.text
+    assert re.search(r"\b(nan|inf|None|undefined \[)\b", read.text) is None
 
 
 def test_without_matplotlib_the_extra_is_named(
@@ -209,8 +209,8 @@ def test_pictures_are_embedded(study: Study) -> None:
     decoded = imageio.imread(io.BytesIO(base64.b64decode(found[1][0])), extension=".png")
     np.testing.assert_array_equal(decoded, picture[:, ::-1])
     read = Reader(page)
-    assert "Source: Ant (3 observations, 2 actions)" in read.words
-    assert "To one scale." in read.words
+    assert "Source: Ant (3 observations, 2 actions)" in read.text
+    assert "To one scale." in read.text
 
 
 NAMES = ("InvertedPendulum", "BigInvertedPendulum", "SmallInvertedPendulum")
@@ -241,11 +241,11 @@ def test_pairs_and_methods_have_tables(suite_page: str) -> None:
     for source, target in permutations(NAMES, 2):
         assert links.count(f"{source}-to-{target}/report.html") == 2
     assert reader.headings[1] == "Fine-tune against scratch"
-    for words, times in (("same body", 3), ("all targets", 3), ("baseline", 4)):
-        assert reader.words.count(words) == times
-    assert "ahead of scratch in 5, behind in 1, and without a clear difference in 0" in reader.words
-    assert "SmallInvertedPendulum fine-tune 10" in reader.words
-    assert "all targets fine-tune 30" in reader.words
+    for text, times in (("same body", 3), ("all targets", 3), ("baseline", 4)):
+        assert reader.text.count(text) == times
+    assert "ahead of scratch in 5, behind in 1, and without a clear difference in 0" in reader.text
+    assert "SmallInvertedPendulum fine-tune 10" in reader.text
+    assert "all targets fine-tune 30" in reader.text
 
 
 @pytest.mark.parametrize("seeds", [2, 5])
@@ -253,10 +253,10 @@ def test_undefined_bootstrap_intervals_are_omitted(seeds: int) -> None:
     """An interval is undefined for two runs, and if all runs of one arm are better."""
     better, worse = rising(900.0, 950.0, 3e3), rising(0.0, 100.0, 3e3, seed=1)
     study = make_study(scratch=worse[:seeds], fine_tune=better[:seeds])
-    words = Reader(suite_html("a", {"a": study}, seeds=seeds)).words
-    assert "1 (no interval)" in words
-    assert "1 [1, 1]" not in words
-    assert (words.count("(no interval)") > 2) == (seeds == 2)
+    text = Reader(suite_html("a", {"a": study}, seeds=seeds)).text
+    assert "1 (no interval)" in text
+    assert "1 [1, 1]" not in text
+    assert (text.count("(no interval)") > 2) == (seeds == 2)
 
 
 @pytest.mark.parametrize(
@@ -291,7 +291,7 @@ def test_strips_are_embedded_and_films_linked(pairs: Mapping[str, Study], suite_
     reader = Reader(suite_html("poles", pairs, seeds=5, strips=strips, films=films))
     assert ("href", "a/film.mp4") in reader.attributes
     assert any(value.startswith("data:image/jpeg") for _, value in reader.attributes)
-    assert "zero-shot: 0.1 m/s" in reader.words
+    assert "zero-shot: 0.1 m/s" in reader.text
     assert "Films" in reader.headings
     assert "Films" not in Reader(suite_page).headings
 
@@ -309,7 +309,7 @@ FEW = "A verdict needs at least 3 seeds: run the same suite again with --seeds 5
 
 
 @pytest.mark.parametrize(
-    ("studies", "words"),
+    ("studies", "text"),
     [
         ([make_study(scratch=FLAT, fine_tune=FLAT)], "difference in 0; neither learned in 1."),
         ([make_study(scratch=LINES, fine_tune=LINES)], "there is no interval in 1."),
@@ -323,10 +323,10 @@ FEW = "A verdict needs at least 3 seeds: run the same suite again with --seeds 5
     ],
 )
 def test_the_verdict_of_a_suite_counts_by_the_rule_of_studies(
-    studies: list[Study], words: str
+    studies: list[Study], text: str
 ) -> None:
     named = {f"{i}": study for i, study in enumerate(studies)}
-    assert words in Reader(suite_html("mine", named, seeds=5)).words
+    assert text in Reader(suite_html("mine", named, seeds=5)).text
 
 
 def test_drawings_are_reproducible(study: Study) -> None:

@@ -144,8 +144,8 @@ FRAMES: Final[dict[str, tuple[str, list[bytes]]]] = {
     "deep_nesting": ("Not a valid message", [frame(b"\x91" * 60_000)]),
     "text_message": ("binary messages", [frame(b'{"kind":"emergencystop"}', TEXT)]),
 }
-for name, (words, sent) in FRAMES.items():
-    ATTACKS[name] = (lambda scene, sent=sent: framed(scene, *sent), words)
+for name, (message, sent) in FRAMES.items():
+    ATTACKS[name] = (lambda scene, sent=sent: framed(scene, *sent), message)
 
 
 # With the key, against a person who has control.
