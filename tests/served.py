@@ -65,10 +65,10 @@ class Served:
         return self.seen.state[self._places[name]]
 
     def rest_ns(self, wiring: TwinWiring) -> int:
-        """Wait until the robot stops without commands; return the ledger's time of the stop."""
+        """Wait until no output propels the robot; return the ledger's time of this, ns."""
         if self._clock == "twin":
             self.operator.advance(1.0)
-            # The daemon reads the new time when a step advances it.
+            # The daemon receives the advanced time only with its next step.
             self.step(*self.seen.action_applied)
         ends: list[float] = []
 

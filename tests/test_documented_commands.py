@@ -77,7 +77,7 @@ def leaves() -> dict[tuple[str, ...], type]:
 
 
 def refusal(words: list[str]) -> str:
-    """Return why a command line is refused; "" if it is a command, with envs that exist."""
+    """Return the error of a command line; "" if it is valid and its envs exist."""
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

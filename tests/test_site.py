@@ -172,7 +172,7 @@ def test_the_site(tmp_path: Path, chromium: Browser) -> None:
             assert (site / "environments" / f"{env_id[13:-3]}.html").exists(), env_id
     # From a comment of docs/build.md, which a code host hides.
     assert 'href="wiring/car.html"' in (site / "build.html").read_text()
-    # Links that leave docs.
+    # Links out of docs, and into docs from the README.
     assert 'href="examples/two_bodies.py"' in (site / "examples.html").read_text()
     assert 'href="atlas.html"' in (site / "index.html").read_text()
     with _served(site) as address:

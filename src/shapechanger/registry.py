@@ -1,4 +1,4 @@
-"""Registries of parts that packages can add: learners, transfer methods and kinds of policies.
+"""Registries of parts that packages can add, such as learners and transfer methods.
 
 A part ships with Shapechanger, is registered by a module that has been imported, or is an entry
 point of an installed package. It is imported on first use.
@@ -17,8 +17,8 @@ from shapechanger.errors import StudyError, UnknownName
 class Registry:
     """Parts of one kind, keyed by name.
 
-    `shipped` contains the parts of Shapechanger as `module:attribute` below `shapechanger`. Other
-    packages add parts as entry points of `group`, such as `shapechanger.methods`.
+    `shipped` contains the parts of Shapechanger as `module` or `module:attribute` below
+    `shapechanger`. Other packages add entry points of `group`, such as `shapechanger.methods`.
     """
 
     def __init__(self, kind: str, group: str, shipped: dict[str, str]) -> None:
@@ -28,7 +28,7 @@ class Registry:
         self._registered: dict[str, Any] = {}
 
     def register(self, name: str, part: Any) -> None:
-        """Register a class as a part, by a new name of letters, digits, - and _."""
+        """Register a part, by a new name of letters, digits, - and _."""
         title = getattr(part, "__name__", repr(part))
         if not name.replace("-", "").replace("_", "").isalnum():
             raise StudyError(
@@ -121,7 +121,7 @@ POLICIES: Final = Registry(
 ROBOTS: Final = Registry(
     "reader of robots", "shapechanger.robots", {"profile": "vehicles.twin:read_robot"}
 )
-"""Functions that read a robot for its simulation; simulations need not import `robot` for it."""
+"""Functions that read a robot, so that simulations need not import `shapechanger.robot`."""
 
 MODELS: Final = Registry(
     "kind of model", "shapechanger.models", {"mujoco": "morphology.certificate.changes"}

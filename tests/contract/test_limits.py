@@ -39,7 +39,7 @@ def test_a_stall_needs_a_push_without_motion(
 
 
 def test_each_action_is_held_back_separately() -> None:
-    """An action at rest stays; all reasons are given, each once."""
+    """An action at rest stays at rest; all reasons are given, each once."""
     limits = LimitPlan(stop_distance_m=0.3, stall_s=0.1, stall_throttle=0.3)
     reflexes = MotionReflexes(GuardPlan("cart", _ACTIONS, (), limits=limits))
     for now_ns in (0, 100_000_000):
@@ -47,7 +47,7 @@ def test_each_action_is_held_back_separately() -> None:
     for aims, allowed, reasons in (
         ((1.0, 0.2, -0.5, 1.0), (1.0, 0.0, 0.0, 1.0), f"{_TOUCH} {_NEAR} {_BACK}"),
         ((1.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 1.0), ""),
-        ((1.0, -0.1, 0.2, 1.0), (1.0, -0.1, 0.0, 1.0), f"{_TOUCH} {_NEAR}"),  # No push backward.
+        ((1.0, -0.1, 0.2, 1.0), (1.0, -0.1, 0.0, 1.0), f"{_TOUCH} {_NEAR}"),  # Stall is over.
     ):
         assert reflexes.hold_back(aims, 100_000_000) == (allowed, reasons)
 

@@ -1,4 +1,4 @@
-"""Camera policies that learn from a teacher with distances."""
+"""Camera policies, the students, that learn from a teacher that observes distances."""
 
 import functools
 from pathlib import Path

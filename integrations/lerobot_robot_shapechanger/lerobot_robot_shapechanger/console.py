@@ -19,7 +19,7 @@ class ShapechangerConsole(Teleoperator):
     rest while no person has control of an armed robot.
 
     Args:
-        config: Name of the robot.
+        config: Configuration with the name of the robot.
     """
 
     config_class = ShapechangerConsoleConfig

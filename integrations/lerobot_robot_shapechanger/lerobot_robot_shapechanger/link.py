@@ -19,7 +19,7 @@ _NO_CAMERA: Final = (160, 120)  # Placeholder for the image size of a robot with
 
 
 class Link:
-    """Connection to a known robot as a program, while it is open.
+    """Connection to a known robot in the role of a program, from `open` to `close`.
 
     Args:
         robot: Name of the known robot; None if LeRobot got no name.

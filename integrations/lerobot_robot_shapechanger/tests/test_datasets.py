@@ -86,7 +86,7 @@ def test_lerobot_reads_an_export(tmp_path: Path, images: bool, hz: float) -> Non
 
 
 def test_statistics_equal_lerobots(tmp_path: Path) -> None:
-    """Statistics of numbers equal LeRobot's of all steps as one episode, and of images NumPy's."""
+    """Statistics of numbers equal LeRobot's of one long episode; those of images equal NumPy's."""
     for count in (30, 12):
         smooth_drive(tmp_path / "data", count, 20.0)
     export_recording(tmp_path / "data", tmp_path / "set", "lerobot", images=True)

@@ -264,7 +264,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         frame_skip: Physics steps per action; None for a step of 20 ms.
         reset_noise_scale: Half-width of the uniform noise of the start pose, rad and m, and
             standard deviation of the noise of its velocities, rad/s and m/s.
-        **arguments: The common arguments above.
+        **arguments: See the section Common arguments of this page.
 
     Attributes:
         task: The task.

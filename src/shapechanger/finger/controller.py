@@ -125,8 +125,8 @@ class FingerBabble:
     """Controller that moves the joints along smooth random motions.
 
     Three joints move independently; the end joint stays near its coupled angle. The controller
-    assumes the nominal finger, and corrects errors of measured angles, `JOINT/angle`. The lowest
-    tensions vary over time. An action, whose meaning is `actions`, lasts `control_dt` seconds.
+    assumes the nominal finger, and steers the measured angles, `JOINT/angle`, to the wanted ones.
+    The lowest tensions vary. An action, whose meaning is `actions`, lasts `control_dt` seconds.
     """
 
     def __init__(

@@ -91,7 +91,7 @@ class FingerReachEnv(FingerEnv):
 
     Args:
         goal: Whether observations are Dicts with goals.
-        **arguments: The common arguments above.
+        **arguments: See the section Common arguments of this page.
     """
 
     measures = (SUCCESS, RETURN, SMOOTHNESS)

@@ -302,7 +302,7 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     Args:
         robot: Name of a known rig, or its address.
         goal: Whether observations are Dicts with goals.
-        **rig: The common arguments above.
+        **rig: See the section Common arguments of this page.
 
     Raises:
         UnknownName, LinkError, RobotRefused: As `RigMixin`.
@@ -333,7 +333,7 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
     Args:
         robot: Name of a known rig, or its address.
         path: As for `FingerTrack-v1`.
-        **rig: The common arguments above.
+        **rig: See the section Common arguments of this page.
 
     Raises:
         PathError: If `path` is not a path, or the nominal finger cannot follow it.

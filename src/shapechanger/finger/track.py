@@ -196,7 +196,7 @@ class FingerTrackEnv(FingerEnv):
         path: A path of `shapechanger.finger.paths`; its name, "circle", "figure-eight", "line" or
             "curve", optionally with settings; a function of time; a CSV file of t, x, y and z; or
             "random" to draw a path at each reset.
-        **arguments: The common arguments above.
+        **arguments: See the section Common arguments of this page.
 
     Raises:
         PathError: If `path` is not a path, or the nominal finger cannot follow it.
@@ -229,7 +229,7 @@ class FingerTrackEnv(FingerEnv):
         return self._path
 
     def start_angles(self, t: float) -> NDArray[np.float64]:
-        """Return the angles at which an episode starts at a time of the path, s; rad, (4,)."""
+        """Return the start angles, rad, (4,), of an episode that begins `t` s into the path."""
         return angles_for(self._path.at(t), self._begin)[0]
 
     def reset(

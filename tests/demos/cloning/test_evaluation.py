@@ -63,7 +63,7 @@ class Answers:
         self.net = SimpleNamespace(classes=())
 
     def outputs(self, *_: object) -> NDArray[np.float64]:
-        """Return the outputs, which the metrics of regression do not use."""
+        """Return the given outputs; as `predict_many`, these are the actions of a regression."""
         return self._done
 
     predict_many = outputs

@@ -92,7 +92,7 @@ def drive(data: Path, count: int = 5, **changes: Any) -> Path:
 
 
 def keys_folder(folder: Path) -> Path:
-    """Create a table of another program, with the pressed key for each of three images."""
+    """Create a table of another program, with the pressed keys of three images."""
     folder.mkdir(parents=True)
     held = ["1.0,0.0,0.0,0.0", "0.0,0.0,0.0,1.0", "0.0,0.0,0.0,0.0"]
     lines = ["file,forward,backward,right,left,timestamp"]
@@ -155,7 +155,7 @@ def all_of(data: Path) -> list[Episode]:
 
 
 def content_of(episode: Episode) -> dict[str, Any]:
-    """Return an episode as JSON without its name and start time, so that NaN equals NaN."""
+    """Return an episode's content without name and start time; NaN is None, which equals itself."""
     head = episode.header.to_json()
     del head["created"]
     kept = {step.index for step in episode.kept}

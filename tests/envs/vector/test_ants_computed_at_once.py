@@ -90,7 +90,7 @@ def test_bodies_and_rewards_may_differ(mode: str, threads: int, concluded: list[
 def test_precision_and_order_of_actions(
     kind: Any, order: Any, arguments: dict[str, Any], concluded: list[int]
 ) -> None:
-    """Costs are summed in the precision of the actions, in any order of memory."""
+    """Costs are summed in the precision of the actions, in any memory order."""
     ours, theirs = _pair([arguments] * 5)
     for envs in (ours, theirs):
         envs.reset(seed=0)

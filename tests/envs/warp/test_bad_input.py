@@ -1,4 +1,4 @@
-"""The backend `warp` refuses missing packages, devices, tasks and invalid actions."""
+"""The backend `warp` refuses missing packages, devices and tasks, and invalid actions."""
 
 from __future__ import annotations
 

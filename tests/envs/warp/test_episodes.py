@@ -19,7 +19,7 @@ PUSH = torch.tensor([[3.0], [0.0], [0.0]])
 
 
 def pendulums(**arguments: Any) -> WarpVectorEnv:
-    """Return three pendulums; pushed with `PUSH`, the first one falls within some ten steps."""
+    """Return three pendulums; pushed with `PUSH`, the first one falls in about ten steps."""
     more = {"backend": "warp", "device": "cpu", **arguments}
     envs = shapechanger.make_vec("InvertedPendulum", WORLDS, **more)
     envs.reset(seed=0)
@@ -49,7 +49,7 @@ def test_same_step_returns_the_start_and_keeps_the_end() -> None:
 
 
 def test_infos_of_a_restart_join_those_of_steps() -> None:
-    """After a restart the infos have the place; the speed is in the infos of the last step."""
+    """After a restart the infos have the new position; the last speed is in `final_info`."""
     envs = shapechanger.make_vec("Hopper", 2, backend="warp", device="cpu", max_episode_steps=1)
     envs.reset(seed=0)
     infos = envs.step(torch.zeros(2, 3))[-1]
@@ -150,7 +150,7 @@ def test_a_world_that_diverges_restarts_alone(velocity: float) -> None:
 
 
 def test_worlds_step_inside_and_outside_inference_mode_without_gradients() -> None:
-    """Worlds rolled out in inference mode step and reset outside of it, and build no graph."""
+    """Worlds that stepped in inference mode can step and be reset outside it, without a graph."""
     envs = pendulums()
     with torch.inference_mode():
         for _ in range(2):

@@ -65,7 +65,7 @@ def test_joints_and_friction_are_found() -> None:
 
 
 def test_windows_begin_in_the_measured_state() -> None:
-    """Windows last 1 s from 0.3 s on, and start with the log's velocities and activations."""
+    """Windows last 1 s from 0.3 s on, and start with velocities and activations from the log."""
     log, _ = short()
     dt = log.control_dt
     windows = cut_windows(log, exact(), motors())
@@ -85,7 +85,7 @@ def test_windows_begin_in_the_measured_state() -> None:
 
 
 def test_known_motors_take_precedence() -> None:
-    """Known motors keep tensions, mass and damping; the lag is always fitted."""
+    """Known motors set tensions, mass and damping; the lag is always fitted."""
     found = with_motors(motors(lag=0.03, strength=0.5), None)
     assert found.motor_lag == 0.03
     assert found.motor_kg == MOTOR_KG
@@ -144,7 +144,7 @@ def test_lag_and_delay_are_found(actions: str) -> None:
     log, _ = recorded(5.0, actions=actions, parameters=parameters)
     found = fit_motors(log)
     assert found.lag == pytest.approx(0.030, abs=0.002)
-    assert found.delay == pytest.approx(0.024, abs=0.005)  # Measured one or two steps late.
+    assert found.delay == pytest.approx(0.024, abs=0.005)  # 1 to 2 physics steps too long.
     assert found.saturates
     assert found.strength == pytest.approx(0.9, abs=0.02)
     assert found.tension_noise == pytest.approx(0.2, rel=0.2)

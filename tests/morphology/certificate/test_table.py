@@ -132,7 +132,7 @@ def test_a_number_counts_where_the_table_says_so_and_nowhere_else(
     assert listed
 
 
-# Arrays from which several numbers of the table are computed, and the row to write to.
+# Arrays on which computed or masked numbers of the table depend, and the row to write to.
 _MADE = {
     **dict.fromkeys(("body_gravcomp", "body_invweight0", "body_subtreemass", "geom_rbound"), 4),
     **{"dof_M0": 3, "dof_invweight0": 3, "geom_contype": 3, "geom_conaffinity": 8},
@@ -180,7 +180,7 @@ def test_signs_of_zeros_and_of_quaternions_are_ignored() -> None:
         assert moved_numbers(model) == nominal
 
 
-def test_a_spring_that_is_a_polynomial_is_one_of_its_own_element() -> None:
+def test_a_polynomial_spring_changes_only_its_own_element() -> None:
     model = everything()
     before = moved_numbers(model)
     model.tendon_stiffnesspoly[0] = model.jnt_stiffnesspoly[1] = 1.0
@@ -226,7 +226,7 @@ _UNSEEN: dict[str, Callable[[mujoco.MjModel], object]] = {
     "override that is off": lambda m: m.opt.o_friction.fill(0.5),
     "energy flag": lambda m: _set(m, "enableflags", mujoco.mjtEnableBit.mjENBL_ENERGY),
     "sensor flag": lambda m: _set(m, "disableflags", mujoco.mjtDisableBit.mjDSBL_SENSOR),
-    "bits of a geom that was compiled without": lambda m: m.geom_contype.__setitem__(10, 1),
+    "contact bits of a geom compiled with none": lambda m: m.geom_contype.__setitem__(10, 1),
 }
 # Written to a compiled model, these count only after `mj_setConst`.
 _CURABLE: dict[str, Callable[[mujoco.MjModel], object]] = {
@@ -268,7 +268,7 @@ def test_wind_and_fluid_shapes_count_only_in_a_medium(density: float, viscosity:
 
 
 def test_what_has_no_part_in_the_motion_is_left_out() -> None:
-    """Bodies that hold only a camera are left out; bodies of moving masses and of pins stay."""
+    """Bodies of cameras only are left out; moving masses, their parents and pinned bodies stay."""
     xml = (
         "<mujoco><asset><hfield name='h' nrow='2' ncol='2' size='1 1 1 1'/>{}</asset><worldbody>"
         "<geom type='hfield' hfield='h'/><body name='b'><freejoint/><geom size='.1'/>{}</body>{}"

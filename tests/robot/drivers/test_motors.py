@@ -15,7 +15,7 @@ _values = st.floats(-1.0, 1.0)
 
 @given(value=_values, start=st.floats(0.0, 0.5), full=st.floats(0.6, 1.0))
 def test_duty_round_trips_within_a_step(value: float, start: float, full: float) -> None:
-    """Only 0 and values below half a step stop the motor; gpiozero truncates to whole percents."""
+    """The motor stops only if its duty rounds to 0 %; gpiozero truncates to whole percents."""
     duty = Duty(start, full)
     done, error = duty.of(value), 0.5 / 100 / (full - start) + 1e-9
     assert duty.size_at(done) == pytest.approx(abs(value), abs=error) or duty.size_at(done) == 0.005

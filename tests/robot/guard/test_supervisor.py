@@ -1,6 +1,6 @@
 """Pins rest when processes are killed, stopped or silent, with real processes and signals.
 
-The time limits are the promised ones, and the time for which the machine did not run a process.
+Each time limit is the promised one plus the time for which the machine did not run a process.
 """
 
 import contextlib
@@ -68,7 +68,7 @@ def test_the_daemon_can_end_the_robot(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def delay_ms() -> Iterator[Callable[[], float]]:
-    """Longest delays of the guard and of the other processes since the last call, in sum."""
+    """A margin plus the longest delays of the guard and of the others since the last call, ms."""
     with contextlib.ExitStack() as stack:
         close = contextlib.closing
         witnesses = [stack.enter_context(close(Witness(one))) for one in ("guard", "normal")]

@@ -174,7 +174,7 @@ class InProcessRobot:
         return self._observe()
 
     def step(self, values: Sequence[float]) -> tuple[Observation, bool]:
-        """Advance one control period with a command; return what is seen, and if it bumped."""
+        """Advance one control period with a command; return the observation and if it bumped."""
         bumps = self._orders.state.bumps
         self._seq += 1
         command = Command(seq=self._seq, answers=0, values=tuple(values), ttl_ms=self._deadline_ms)

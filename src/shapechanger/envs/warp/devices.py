@@ -65,7 +65,7 @@ def as_torch(array: Any) -> Tensor:
 
 
 def as_warp(tensor: Tensor, dtype: Any) -> Any:
-    """Return a Warp array of numbers of a type that shares the memory of a contiguous tensor."""
+    """Return a Warp array, with elements of `dtype`, that shares a contiguous tensor's memory."""
     return wp.from_torch(tensor, dtype=dtype, requires_grad=False)
 
 

@@ -21,7 +21,7 @@ from shapechanger.morphology import Body
 
 _Make = Callable[[dict[str, Any]], gym.Env[Any, Any]]
 MakeWorlds = Callable[..., Worlds]
-"""Makes `Worlds` from the numbers of the worlds and the further arguments of the class."""
+"""Makes `Worlds` from those arguments of the class that are not bound yet."""
 
 
 class BodyReader:
@@ -48,11 +48,11 @@ class BodyReader:
         return self._usual if value is None else self._envs[0].family.body(value)
 
     def read(self, body: Any) -> tuple[DeviceBody, MakeWorlds]:
-        """Compile a body, and return it with the maker of a batch that begins with it."""
+        """Compile a body, and return it with a maker of batches that use the compiled model."""
         env = self._env_with(body)
         model = env.model
         if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
-            # mujoco-warp has no PGS. Newton's method solves the same problem until convergence.
+            # mujoco-warp has no PGS. Newton's method solves the same problem, and converges.
             model = copy.copy(model)
             model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         layouts = env.observation_layout, env.action_layout
@@ -100,7 +100,7 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
         arguments: Arguments of the first CPU env.
 
     Raises:
-        VectorEnvError: If the task has no batched functions, or mujoco-warp has another version.
+        VectorEnvError: If the task has no batched functions, or mujoco-warp has a wrong version.
     """
     follow_mujoco()
     first = make(arguments)
@@ -118,7 +118,7 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
 def grouped(reader: BodyReader, bodies: Sequence[Any], num_envs: int) -> list[MakeWorlds]:
     """Compile bodies, assign them to worlds in turn, and group worlds that can share a batch.
 
-    Return a function per group, which makes its `Worlds` from the arguments from `device` on.
+    Return a function per group, which makes its `Worlds` from `device`, `redraws` and `limits`.
     """
     kinds: list[tuple[MakeWorlds, dict[Any, DeviceBody]]] = []
     for body in dict.fromkeys(bodies):

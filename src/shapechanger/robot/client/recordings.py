@@ -176,7 +176,7 @@ def end_recording(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
 def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> None:
     """Replay an episode on a robot after a person at this terminal has armed it.
 
-    The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.
+    The robot's caps, reflexes and deadline apply as usual. Any key or error stops the replay.
     """
     known = recall(name)
     with Terminal() as terminal, RobotClient.connect(known, role="person", frames=False) as robot:

@@ -27,7 +27,7 @@ def _tables() -> dict[str, dict[str, Any]]:
 
 
 class _Presets(Mapping[str, LearnerSettings]):
-    """Shipped settings, keyed by name; each preset is read when it is accessed."""
+    """Shipped settings, keyed by name; each preset is converted when it is accessed."""
 
     def __getitem__(self, name: str) -> LearnerSettings:
         table = _tables()[name]

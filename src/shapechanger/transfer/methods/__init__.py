@@ -30,13 +30,13 @@ class MethodRun:
 
     Attributes:
         steps: Target steps that may be used, a multiple of the steps of an update.
-        source_steps: Source steps of a policy that the method trains itself.
+        source_steps: Source steps of the policy that the method starts from or trains itself.
         seed: Seed of the run, from which all random numbers must derive.
         folder: Folder of the run, for files of the method.
         source_file: File of the source policy of this run's seed, or of the given source policy.
         policy_file: File of the policy of this run.
         shared: Returns the file that runs of a kind share, such as "source" or "scratch".
-        kind: The kind of the run.
+        kind: Name of the method, or "source" for the training of the source policy.
         identity: Identity of a custom method, for the card of its policy; empty for shipped ones.
         report: Records an evaluation on the target. Evaluations of a method that learns on the
             target must be at the same steps as the evaluations of scratch.
@@ -138,7 +138,7 @@ class Method:
         name: Name of the method, which `--arms` takes.
         paper: The publication that describes the method.
         uses_source_policy: Whether the method starts from the source policy of the study.
-        uses_source: Whether the method needs source steps, which count in total steps.
+        uses_source: Whether the method needs source steps, which count as total steps.
         trains: Whether the method trains a policy, which `learn` returns.
         learns_on_target: Whether the method trains on the target and has a learning curve there.
         needs: Required entries of the learner's `takes`, each with a description of such learners.

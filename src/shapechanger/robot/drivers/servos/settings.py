@@ -40,7 +40,7 @@ class Register(msgspec.Struct, frozen=True):
     name: str  # Name in the manual.
     address: int  # Address of its first byte.
     size: int  # Size in bytes, little-endian.
-    # Code of negative numbers: "complement", or "bit" for a highest bit; "" if unsigned.
+    # Code of negative numbers: "complement", or "bit" for the highest bit as sign; "" if unsigned.
     sign: Literal["", "complement", "bit"] = ""
     initial: int = 0  # Value at delivery, and after power-on if it is not in the EEPROM.
     # Ranges of permitted values; empty if the register is read-only.
@@ -70,8 +70,8 @@ class ServoFamily(msgspec.Struct, frozen=True):
     - `mode`: Operating mode.
     - `most`: Limit of `goal`, in the EEPROM.
     - `torque_enable`: 1 for torque, 0 for none.
-    - `mark`: Reveals a restart, because it is 0 only after one: the bus watchdog if there is one,
-      or the acceleration.
+    - `mark`: Reveals a restart, because only a restart leaves it at 0: the bus watchdog if the
+      family has it, else the acceleration.
     - `goal`: Goal of the current; with control of the length, limit of the current. In a family
       without control of the tension, limit in thousandths of the stall torque.
     - `lock`: Must be 0 to write to the EEPROM; families without it need the torque off.
@@ -80,8 +80,8 @@ class ServoFamily(msgspec.Struct, frozen=True):
     """
 
     name: str
-    # Version of the packets in `dynamixel_sdk`. Feetech uses 1.0 with the instructions of 2.0 for
-    # several servos. Addresses, lengths and checksums have 1 or 2 bytes.
+    # Version of the packets in `dynamixel_sdk`. Feetech uses 1.0, with 2.0's instructions for
+    # several servos. Addresses, lengths and checksums have 1 byte in 1.0, and 2 bytes in 2.0.
     protocol: float
     most_id: int  # Highest id.
     baud_rates: tuple[int, ...]  # Baud rates of the servos; the SDK lacks 4.5 Mbaud.
@@ -112,7 +112,7 @@ class ServoFamily(msgspec.Struct, frozen=True):
 
 
 class ServoModel(msgspec.Struct, frozen=True, array_like=True):
-    """Model of a servo, a row of `servos.toml`; values of motor and gears refer to the output."""
+    """Servo model, a row of `servos.toml`; values of motor and gears refer to the output shaft."""
 
     name: str
     family_name: str
@@ -150,7 +150,7 @@ class ServoModel(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def ampere_per_goal(self) -> float:
-        """Unit of its goal, A; for a fraction of the stall torque, with the motor at rest."""
+        """Unit of its goal, A; a share of the stall torque is that share of the stall current."""
         is_current = "tension" in self.family.modes
         return self.ampere_per_count if is_current else self.stall_a / self.most_counts
 
@@ -180,14 +180,14 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
     """A servo and its tendon.
 
     A tension is computed from the current, without friction. The friction of the gears reduces it
-    by some newtons while the spool winds in, and increases it while the tendon pulls it out; see
+    by some newtons while the spool winds in, and increases it while the tendon turns it back; see
     `ServoModel.friction_nm`.
 
     Attributes:
         name: Name of the tendon and of its output, such as "FDP".
         id: Id on the bus.
         model: Name of its model; see `MODELS`.
-        spool_radius_m: Radius of the tendon on the spool, with half the tendon's thickness, m.
+        spool_radius_m: Radius of the tendon on the spool, including half its thickness, m.
         most_tension_n: Largest tension, N, which is also set as the servo's limit.
         pretension_n: Smallest tension while the servo has torque, N.
         homing_n: Tension for finding the zero, N.
