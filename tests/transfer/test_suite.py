@@ -118,18 +118,15 @@ def test_runs_of_a_target_are_shared(out: Path) -> None:
     assert parallel.summaries == alone.summaries
 
 
-def test_nothing_is_shared_if_source_and_target_are_swapped(out: Path) -> None:
-    assert _requested(_plan(WET, DRY), out) == _names(*_KINDS)
-
-
 @pytest.mark.parametrize(
-    "differs", [{"seed": 1}, {"steps": 20}, {"source_steps": 40}, {"versions": {"torch": "0.1"}}]
+    "plan",
+    [
+        _plan(WET, DRY),  # Source and target are swapped.
+        *(_plan(DRY, ICY, **more) for more in ({"seed": 1}, {"steps": 20}, {"source_steps": 40})),
+        msgspec.structs.replace(_plan(DRY, ICY), versions={"torch": "0.1"}),
+    ],
 )
-def test_studies_with_other_plans_share_nothing(out: Path, differs: dict[str, Any]) -> None:
-    changed = {name: value for name, value in differs.items() if name != "versions"}
-    plan = _plan(DRY, ICY, **changed)
-    if "versions" in differs:
-        plan = msgspec.structs.replace(plan, **differs)
+def test_studies_with_other_plans_share_nothing(out: Path, plan: Plan) -> None:
     assert _requested(plan, out) == _names(*_KINDS)
 
 

@@ -70,12 +70,9 @@ def many(name: str, **arguments: Any) -> tuple[WarpVectorEnv, list[Any]]:
 
 
 def set_all(worlds: WarpVectorEnv, alone: Sequence[Any], states: Any) -> None:
-    """Put worlds of one batch and CPU envs into the same states, without warm starts.
+    """Put worlds of one batch, and a CPU env per world, into states without warm starts.
 
-    Args:
-        worlds: The worlds; their episodes begin.
-        alone: One CPU env per world, after a reset.
-        states: `qpos` and `qvel` of each.
+    A state is `qpos` and `qvel`. Episodes of the worlds begin; the CPU envs have had a reset.
     """
     qpos = torch.tensor(np.array([q for q, _ in states]), dtype=torch.float32)
     qvel = torch.tensor(np.array([v for _, v in states]), dtype=torch.float32)

@@ -107,9 +107,7 @@ def test_the_table_states_each_rule() -> None:
     assert lines[0].split() == ["side", "entry", "rule", "why"]
     assert lines[2] == "observation  lost         zero                  default"
     assert len(lines) == 8
-
-
-def test_the_short_form_counts_the_rules() -> None:
+    # The short form counts the rules.
     assert repr(small()) == (
         "BodyMap(observation: {'Copy': 1, 'Zero': 1, 'Hold': 1}; action: {'Copy': 3, 'Learn': 1})"
     )

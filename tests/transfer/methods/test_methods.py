@@ -117,15 +117,13 @@ def _weights(study: tuple[Study, Path], kind: str) -> dict[str, Any]:
     return dict(load_policy(Run(kind, 0).policy_file(out)).model.policy.state_dict())
 
 
-def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
+def test_curves_have_the_steps_of_scratch_and_fine_tuning_starts_with_the_source(
+    study: tuple[Study, Path],
+) -> None:
     made, _ = study
     for kind in ("scratch", *_LEARNING):
         assert [e.steps for e in made.of(kind)[0].curve] == [0, 32, 64, 96, 128], kind
     assert set(made.summaries) == set(_LEARNING)
-
-
-def test_methods_that_fine_tune_start_with_the_source_policy(study: tuple[Study, Path]) -> None:
-    made, _ = study
     starts = {kind: made.of(kind)[0].curve[0].mean_return for kind in _LEARNING}
     assert starts["frozen-trunk"] == starts["evolution"] == starts["fine-tune"]
 
@@ -176,7 +174,7 @@ def test_learned_actions_are_not_distilled() -> None:
 
 
 def test_intermediate_bodies_grow() -> None:
-    """Bodies between two pendulums grow in equal steps, without the two ends."""
+    """They grow in equal steps, without the two ends, and belong to one family."""
     lengths = []
     for ref in bodies_between(SMALL, BIG, 2):
         made = ref.make()
@@ -184,6 +182,8 @@ def test_intermediate_bodies_grow() -> None:
         lengths.append(2.0 * float(pole.size[1]))
         made.close()
     np.testing.assert_allclose(lengths, [0.6, 0.9], rtol=1e-5)
+    with pytest.raises(StudyError, match="must be bodies of one family"):
+        bodies_between(ANT, BIG, 1)
 
 
 def test_a_shuffled_map_has_the_same_rules() -> None:
@@ -415,8 +415,3 @@ def test_unsuitable_arms_are_refused(
 ) -> None:
     with pytest.raises(StudyError, match=message):
         tiny_plan(settings, task=task, arms=("scratch", arm))
-
-
-def test_there_are_no_bodies_between_two_families() -> None:
-    with pytest.raises(StudyError, match="must be bodies of one family"):
-        bodies_between(ANT, BIG, 1)
