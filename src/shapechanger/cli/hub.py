@@ -135,20 +135,6 @@ def _refuse_onnx(path: Path) -> None:
         )
 
 
-def _linked(episodes: list[Episode], folder: Path) -> dict[str, str]:
-    """Link the files of episodes into a folder; return their steps' SHA-256, keyed by name."""
-    hashes: dict[str, str] = {}
-    for episode in episodes:
-        name = f"{hub.EPISODES}/{episode.path.resolve().name}"
-        frames = {f"{FRAMES}/{step.frame}" for step in episode.steps if step.frame}
-        for file in (HEADER, STEPS, *frames):  # `lost/` is not uploaded.
-            link = folder / name / file
-            link.parent.mkdir(parents=True, exist_ok=True)
-            link.symlink_to((episode.path / file).resolve())
-        hashes[f"{name}/{STEPS}"] = hub.sha256_of(episode.path / STEPS)
-    return hashes
-
-
 def _policy_card(file: Path, repo: str) -> str:
     card = load_policy(file).card
     rows: dict[str, object] = {**origin_of(card), "SHA-256": hub.sha256_of(file)}
