@@ -22,7 +22,7 @@ INSTALLED_LEROBOT := $(LEROBOT_VENV)/.installed
 ROBOT_FILES := .robot-files
 INSTALLED_ROBOTS := $(ROBOT_FILES)/.installed
 # Tests of the files that `tool.coverage` measures. Under coverage a test takes almost twice as long.
-COVERING := tests/contract/test_drive_reward.py tests/envs/stepping tests/envs/test_own.py tests/envs/test_own_models.py \
+COVERING := tests/contract/test_drive_reward.py tests/contract/test_limits.py tests/envs/stepping tests/envs/test_own.py tests/envs/test_own_models.py \
 	tests/envs/test_own_scenes.py tests/envs/test_own_tasks.py tests/envs/vector tests/finger/identify \
 	tests/finger/test_paths.py tests/finger/test_task.py tests/laws tests/morphology tests/robot/guard tests/robot/link \
 	tests/robot/profile tests/test_architecture.py tests/test_errors.py tests/test_layout.py \

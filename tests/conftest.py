@@ -41,6 +41,7 @@ COVERING = tuple(
             "test_errors.py",
             "test_layout.py",
             "contract/test_drive_reward.py",
+            "contract/test_limits.py",
         ),
         *("envs/stepping/", "envs/vector/", "envs/test_own_tasks.py", "laws/", "morphology/"),
         *("finger/identify/", "finger/test_paths.py", "finger/test_task.py"),

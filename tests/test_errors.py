@@ -18,6 +18,7 @@ from shapechanger.errors import (
     StudyError,
     UnknownName,
     check_seed,
+    needing_extra,
     no_policy_file,
 )
 
@@ -45,6 +46,10 @@ def test_missing_extras_name_the_command() -> None:
     error = MissingExtra("mujoco", "sim")
     assert "run `pip install 'shapechanger[sim]'`" in str(error)
     assert (error.package, error.extra) == ("mujoco", "sim")
+    with pytest.raises(MissingExtra, match="This needs no_such_package"), needing_extra("sim"):
+        import no_such_package  # noqa: F401  # pyright: ignore[reportMissingImports, reportUnusedImport]
+    with pytest.raises(ZeroDivisionError), needing_extra("sim"):
+        _ = 1 / 0
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from shapechanger.contract.limits import MotionReflexes, Propulsion, Stall
+from shapechanger.contract.limits import Duty, MotionReflexes, Propulsion, Stall
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, SensorPlan
 
 _ACTIONS = (
@@ -14,6 +14,10 @@ _ACTIONS = (
 _TOUCH = "Not forward: the bumper touched something."
 _NEAR = "Not forward: something is near."
 _BACK = "Not backward: it pushes and does not move."
+
+
+def test_no_duty_is_no_value() -> None:
+    assert Duty(start=0.2).size_at(0.0) == 0.0 < Duty(start=0.2).size_at(0.01)
 
 
 def test_push_and_speed_are_means() -> None:

@@ -13,7 +13,7 @@ import msgspec
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, reject, settings
+from hypothesis import assume, given, reject, settings
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
@@ -161,6 +161,8 @@ def test_mass_scales_as_density(body: str, factor: float) -> None:
     )
 )
 def test_edits_of_different_bodies_commute(edits: tuple[Edit, Edit]) -> None:
+    # A stretched segment carries the next one by its hinge; without a hinge, by its origin.
+    assume(not (isinstance(edits[0], Stretch) and isinstance(edits[1], Lock)))
     a, b = built(leg(), *edits), built(leg(), *reversed(edits))
     for field in differing(a, b):
         np.testing.assert_allclose(

@@ -32,14 +32,14 @@ def test_a_card_states_the_numbers_of_the_profile() -> None:
     assert (card.deadline_ms, card.max_observation_age_ms) == (250, 400)
     # Steering and throttle, which may fall to rest at once.
     assert (card.slew_per_s, card.slew_down_per_s) == ((0.0, 4.0), (0.0, 0.0))
-    assert (card.camera_pitch_deg, card.camera_fovy_deg) == (0.0, 48.8)
+    assert card.camera_deg == (0.0, 48.8)
     assert card.turning == pytest.approx((math.radians(108.0), 0.0))
     assert (card.arming, card.clock, card.reset) == ("person", "real", ())
     weights = {"velocity": 1.0, "collision": -10.0, "stall": -1.0}
     assert card.reward == weights | {"collision_ends_episode": 1.0}
     twin = card_of(profile, arming="anyone", clock="twin", pictures=False)
     assert (twin.arming, twin.clock, twin.image_size) == ("anyone", "twin", None)
-    assert (twin.camera_pitch_deg, twin.camera_fovy_deg) == (None, None)
+    assert twin.camera_deg == (None, None)
 
 
 def test_a_welcome_without_a_required_field_is_refused() -> None:
