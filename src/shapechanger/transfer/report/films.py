@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
@@ -64,13 +63,12 @@ def film_study(
     drives = "demonstrations" in study.plan.settings.takes
     scenes = _scenes(study, folder, source_policy, drives)
     # Bodies of one family are drawn at the same scale.
+    views = [("", 0.0) if drives else _view_of(scene.env) for scene in scenes]
     distances: dict[str, float] = {}
-    for env in [] if drives else [scene.env for scene in scenes]:
-        family = _family_of(env)
-        if family:
-            distances[family] = max(view_distance(env), distances.get(family, 0.0))
-    for scene in scenes:
-        frames, fps, measured = _play(scene, distances, shadows, drives)
+    for family, distance in views:
+        distances[family] = max(distance, distances.get(family, 0.0))
+    for scene, (family, _) in zip(scenes, views, strict=True):
+        frames, fps, measured = _play(scene, distances[family], shadows, drives)
         if not frames:
             return []
         gap = np.full((_HEIGHT, _GAP, 3), 255, np.uint8)
@@ -91,17 +89,17 @@ def film_study(
     return strips
 
 
-def _family_of(env_ref: EnvRef) -> str:
-    """Return the family of an env whose body may be reshaped, and thus drawn; "" for others."""
+def _view_of(env_ref: EnvRef) -> tuple[str, float]:
+    """Return the family of an env's body, and the distance of the camera, m; ("", 0) without."""
     with closing(env_ref.make()) as env:
-        return str(getattr(env.unwrapped, "family_name", ""))
+        inner: Any = env.unwrapped
+        family = str(getattr(inner, "family_name", ""))
+        return family, inner.mujoco_renderer.default_cam_config["distance"] if family else 0.0
 
 
 def view_distance(env_ref: EnvRef) -> float:
     """Return the distance from which frames of an env of a family show its body, m."""
-    with closing(env_ref.make()) as env:
-        inner: Any = env.unwrapped
-        return float(inner.mujoco_renderer.default_cam_config["distance"])
+    return _view_of(env_ref)[1]
 
 
 def _scenes(study: Study, folder: Path, given: Path | None, drives: bool) -> list[_Scene]:
@@ -136,18 +134,17 @@ def median_index(study: Study, kind: str) -> int:
 
 
 def _play(
-    scene: _Scene, distances: Mapping[str, float], shadows: bool, drives: bool
+    scene: _Scene, distance: float, shadows: bool, drives: bool
 ) -> tuple[list[NDArray[np.uint8]], float, str]:
     """Return frames, their rate, Hz, and a text with the default measure over them."""
     size: dict[str, Any] = {}
-    family = "" if drives else _family_of(scene.env)
     if not drives:
         finer = {"width": _FINER * _WIDTH, "height": _FINER * _HEIGHT}
-        size = {"render_mode": "rgb_array", **finer, **({"shadows": shadows} if family else {})}
+        size = {"render_mode": "rgb_array", **finer, **({"shadows": shadows} if distance else {})}
     with closing(scene.env.make(**size)) as env:
         inner: Any = env.unwrapped
-        if family:
-            inner.mujoco_renderer.default_cam_config["distance"] = distances[family]
+        if distance:
+            inner.mujoco_renderer.default_cam_config["distance"] = distance
 
         def frame() -> NDArray[Any]:
             if drives:
