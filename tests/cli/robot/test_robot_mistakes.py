@@ -79,6 +79,7 @@ MISTAKES = (
     ("serve test-car.toml --twin --port 0 --world coridor", "Did you mean 'corridor'?"),
     ("serve test-car.toml --twin --port 0 --world room --lens dirt", "choose another --world"),
     ("serve test-car.toml --twin --port 0 --lens nihgt", "Did you mean 'night'?"),
+    ("serve finger --twin --port 0 --lens dirt", "No vehicle matches 'finger'"),
     ("serve cat --twin --port 0 --world corridor", "there is no cat in MuJoCo"),
     ("serve car --twin --port 0 --world harbour", "A car does not float"),
     ("serve finger --twin --port 0 --finger-seed 3", "--finger-seed needs --gap"),

@@ -17,9 +17,10 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import RobotError, StudyError, UnknownName
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.reach import FingerReachEnv
+from shapechanger.layout import Feature, Layout
 from shapechanger.policy import load_policy
 from shapechanger.registry import METHODS
-from shapechanger.transfer.body_map import body_map
+from shapechanger.transfer.body_map import BodyMap, body_map
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
@@ -171,6 +172,9 @@ def test_learned_actions_are_not_distilled() -> None:
     shown = teacher(np.zeros((3, crossing.target_observation.size)))
     assert shown.shape == (3, 12)
     assert (shown[:, teacher.taught] == 1.0).all()
+    block = Layout([Feature("wheels", "1", -1.0, 1.0, shape=(3,)), Feature("arm", "1", -1.0, 1.0)])
+    blocks = BodyMap.between(crossing.source_observation, crossing.source_observation, block, block)
+    assert MappedTeacher(lambda observations: observations, blocks).taught.shape == (4,)
 
 
 def test_intermediate_bodies_grow() -> None:
